@@ -1,10 +1,11 @@
 #include "compare/baseline.h"
 
+#include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "cli/input_files.h"
 #include "cli/json_file.h"
 #include "cli/table.h"
 #include "esvr/error.h"
@@ -22,32 +23,55 @@ constexpr double kBytesTolerance = 0.01;  // default tolerance of the size, as a
   throw BadInput(path.string() + ": not a baseline: " + why);
 }
 
-Json readBaseline(const std::filesystem::path& path) {
-  std::ifstream stream(path);
-  if (!stream) throw BadInput(path.string() + ": cannot be read (--update makes it)");
-  Json json = Json::parse(stream, nullptr, false);
-  if (json.is_discarded() || !json.is_object()) notABaseline(path, "no JSON object");
-  if (json.value("schema", Json()) != kBaselineSchema)
-    notABaseline(path, std::string("its \"schema\" is not \"") + kBaselineSchema + '"');
-  if (json.value("schema_version", Json()) != kBaselineVersion)
-    notABaseline(path, "its \"schema_version\" is not " + std::to_string(kBaselineVersion));
-  if (!json.contains("grids") || !json["grids"].is_object()) notABaseline(path, "no \"grids\"");
-  return json;
-}
-
 struct Entry {
   double value = 0.0, tolerance = 0.0;
 };
 
 /// \param json  object with "value" and "tolerance"
 Entry entryOf(const std::filesystem::path& path, const std::string& what, const Json& json) {
+  constexpr const char *kValue = "value", *kTolerance = "tolerance";
+  if (!json.is_object()) notABaseline(path, what + " is no object with a value and a tolerance");
+  for (const auto& item : json.items())
+    if (item.key() != kValue && item.key() != kTolerance)
+      notABaseline(path, what + " has \"" + item.key() + "\", which is neither of both");
   const auto number = [&](const char* key) {
-    if (!json.is_object() || !json.contains(key)) notABaseline(path, what + " has no " + key);
-    if (json[key].is_null()) return std::numeric_limits<double>::infinity();
+    if (!json.contains(key)) notABaseline(path, what + " has no " + key);
     if (!json[key].is_number()) notABaseline(path, what + ": " + key + " is not a number");
     return json[key].get<double>();
   };
-  return {number("value"), number("tolerance")};
+  const bool isInfinite = json.contains(kValue) && json[kValue].is_null();
+  const Entry entry{isInfinite ? std::numeric_limits<double>::infinity() : number(kValue),
+                    number(kTolerance)};
+  if (!(entry.tolerance >= 0.0)) notABaseline(path, what + ": the tolerance is below 0");
+  return entry;
+}
+
+/// Checks the figures of a grid: a figure that is misspelt would not be checked.
+void requireFigures(const std::filesystem::path& path, const std::string& grid, const Json& json) {
+  const std::string where = "grid \"" + grid + "\"";
+  if (!json.is_object()) notABaseline(path, where + " is no object with figures");
+  for (const auto& item : json.items()) {
+    const auto isIt = [&](const Figure& figure) { return figure.key == item.key(); };
+    if (std::ranges::none_of(allFigures(), isIt))
+      notABaseline(path, where + " has \"" + item.key() + "\", which is no figure");
+    (void)entryOf(path, where + ": " + item.key(), item.value());
+  }
+}
+
+Json readBaseline(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path))
+    throw BadInput(path.string() + ": cannot be read (--update makes it)");
+  Json json = Json::parse(cli::readText(path), nullptr, false);
+  if (json.is_discarded() || !json.is_object()) notABaseline(path, "no JSON object");
+  if (json.value("schema", Json()) != kBaselineSchema)
+    notABaseline(path, std::string("its \"schema\" is not \"") + kBaselineSchema + '"');
+  if (json.value("schema_version", Json()) != kBaselineVersion)
+    notABaseline(path, "its \"schema_version\" is not " + std::to_string(kBaselineVersion));
+  if (!json.contains("grids") || !json["grids"].is_object()) notABaseline(path, "no \"grids\"");
+  if (json.contains("bytes") && !std::isfinite(entryOf(path, "bytes", json["bytes"]).value))
+    notABaseline(path, "bytes: value is not a number");
+  for (const auto& grid : json["grids"].items()) requireFigures(path, grid.key(), grid.value());
+  return json;
 }
 
 enum class Verdict { kWithin, kWorse, kBetter };
@@ -68,8 +92,12 @@ void judgeGrid(const std::filesystem::path& path, const Json& stored, const Chec
                CheckRecord& record) {
   for (const Figure& figure : allFigures()) {
     const auto value = valueOf(grid.figures, figure);
-    if (!value || !stored.contains(figure.key)) continue;
+    if (!stored.contains(figure.key)) continue;
     const std::string where = "grid \"" + grid.name + "\": " + figure.header;
+    if (!value) {
+      record.notes.push_back(where + " of the baseline was not measured");
+      continue;
+    }
     const Entry entry = entryOf(path, where, stored[figure.key]);
     tell(judge(figure.higherIsBetter, entry, *value),
          where + " " + textOf(figure, *value) + ", baseline " + textOf(figure, entry.value) +
@@ -83,7 +111,7 @@ void judgeBytes(const std::filesystem::path& path, const Json& baseline, CheckRe
   const Entry entry = entryOf(path, "bytes", baseline["bytes"]);
   tell(judge(false, entry, double(record.candidateBytes)),
        std::to_string(record.candidateBytes) + " bytes, baseline " +
-           std::to_string(std::uint64_t(entry.value)) + " within " +
+           std::to_string(std::uint64_t(std::max(entry.value, 0.0))) + " within " +
            cli::shortNumber(entry.tolerance),
        record);
 }

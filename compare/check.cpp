@@ -1,11 +1,14 @@
 #include "compare/check.h"
 
+#include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "cli/interrupts.h"
 #include "cli/json_file.h"
 #include "cli/output.h"
+#include "cli/sequence.h"
 #include "cli/thread_limit.h"
 #include "compare/baseline.h"
 #include "compare/check_report.h"
@@ -19,15 +22,13 @@ namespace esvr::compare {
 namespace {
 
 void checkFiles(const CheckOptions& options) {
-  std::vector<std::filesystem::path> files;
-  if (options.baseline) files.push_back(*options.baseline);
-  if (!options.report.empty() && options.report != cli::kStandardOutput) {
-    files.emplace_back(options.report);
-    cli::checkOutput(options.report, {".json"}, options.overwrite);
-  }
+  std::vector<std::filesystem::path> inputs, outputs{options.report};
   for (const auto& input : {options.reference, options.candidate})
-    for (const auto& file : files) cli::requireDistinct({input, file});
-  cli::requireDistinct(files);
+    std::ranges::copy(cli::filesOfInput(input.string()), std::back_inserter(inputs));
+  if (options.baseline) (options.update ? outputs : inputs).push_back(*options.baseline);
+  cli::requireSeparate(inputs, outputs);
+  if (!options.report.empty() && options.report != cli::kStandardOutput)
+    cli::checkOutput(options.report, {".json"}, options.overwrite);
   if (options.update) cli::checkOutput(*options.baseline, {".json"}, true);
 }
 
@@ -38,10 +39,13 @@ void tell(const CheckOptions& options, const CheckRecord& record) {
     printCheck(record, std::cout);
 }
 
+/// A missed limit or a difference counts more than a grid that cannot be read.
 void throwFailures(const CheckOptions& options, const CheckRecord& record) {
-  if (record.failures.empty()) return;
+  if (record.failures.empty() && record.unreadable.empty()) return;
   std::string text = options.candidate.string() + " fails:";
   for (const auto& failure : record.failures) text += "\n  " + failure;
+  for (const auto& failure : record.unreadable) text += "\n  " + failure;
+  if (record.failures.empty()) throw BadInput(text);
   throw TargetMissed(text);
 }
 

@@ -27,13 +27,15 @@ cli::ProgramText programText() {
           "  esvr-compare check REF CAND [--min-psnr DB] [--max-error E] [--max-bytes SIZE] ...\n"
           "  esvr-compare check REF CAND --baseline FILE.json [--update]",
       .notes =
-          "REF and CAND may each be a .vdb, .nvdb or .esvr file. Grids are compared and not the "
+          "REF and CAND may each be a .vdb, .nvdb or .esvr file, - for standard input, or a pipe. "
+          "Grids are compared and not the "
           "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels "
           "are compared in index space. Different transforms, names, classes, value types, "
           "backgrounds and metadata are listed, and the check fails if --fail-on names them. It "
           "always fails if only one of the files has a grid, if a grid has become one of another "
           "type, or if the bounding boxes of the active voxels of the two grids do not intersect. "
-          "Grids that are not of floats or doubles are compared bit for bit. --ignore-grids "
+          "Grids that are not of floats or doubles, and grids of the same bytes, are compared bit "
+          "for bit. --ignore-grids "
           "excludes a grid from all of this.\n"
           "\n"
           "REF and CAND may both be sequences: a pattern such as smoke.####.vdb, or an .esvr file "
@@ -43,7 +45,8 @@ cli::ProgramText programText() {
           "A baseline holds figures and their tolerances. --update writes the figures of this run "
           "and keeps the tolerances of the file.\n"
           "\n"
-          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input, 4 a "
+          "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input or a grid "
+          "that cannot be compared, 4 a "
           "limit was missed, 5 not enough memory (--max-memory).",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
@@ -57,6 +60,8 @@ cli::CommandLine makeCommandLine() {
   cli::CommandLine line(programText());
   line.argument("reference", "REF");
   line.argument("candidate", "CAND");
+  line.volumeInputs({"reference", "candidate"});
+  line.textInputs({"baseline"});
   auto& options = line.options();
   options.add_options()(
       "grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
@@ -75,7 +80,7 @@ cli::CommandLine makeCommandLine() {
      "largest size of the file CAND, for example 200KB")
     ("fail-on", value<std::string>()->value_name("KINDS"),
      "differences for which the check fails, separated by commas: name, class, type, "
-     "background, transform, metadata, or all")
+     "background, transform, metadata, inactive (values of inactive voxels), or all")
     ("ssim", bool_switch(), "measure and print the SSIM even without a limit on it")
     ("baseline", value<std::string>()->value_name("FILE.json"),
      "compare with the figures of this file")
@@ -91,15 +96,16 @@ cli::CommandLine makeCommandLine() {
 std::set<DifferenceKind> kindsOf(const std::string& word) {
   using Kind = DifferenceKind;
   if (word == "all")
-    return {Kind::kName,       Kind::kClass,     Kind::kValueType,
-            Kind::kBackground, Kind::kTransform, Kind::kMetadata};
+    return {Kind::kName,      Kind::kClass,    Kind::kValueType, Kind::kBackground,
+            Kind::kTransform, Kind::kMetadata, Kind::kInactive};
   return {cli::choose<Kind>("fail-on", word,
                             {{"name", Kind::kName},
                              {"class", Kind::kClass},
                              {"type", Kind::kValueType},
                              {"background", Kind::kBackground},
                              {"transform", Kind::kTransform},
-                             {"metadata", Kind::kMetadata}})};
+                             {"metadata", Kind::kMetadata},
+                             {"inactive", Kind::kInactive}})};
 }
 
 std::set<DifferenceKind> parseKinds(const std::string& list) {
@@ -133,6 +139,7 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   if (!arguments) return std::nullopt;
   const Arguments& a = *arguments;
   CheckOptions options;
+  options.inputs = a.inputs;
   options.reference = a.get<std::string>("reference");
   options.candidate = a.get<std::string>("candidate");
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});

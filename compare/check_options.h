@@ -21,6 +21,7 @@ namespace esvr::compare {
 
 struct CheckOptions {
   std::filesystem::path reference, candidate;
+  cli::InputFiles inputs;
   std::optional<std::vector<cli::FrameNumber>>
       frames;                      ///< frames that are compared, of sequences; nothing: all
   std::vector<std::string> grids;  ///< NAME or NAME=NAME IN CAND; empty: all

@@ -18,6 +18,10 @@ struct CheckedGrid {
   FigureValues figures{};
   std::vector<Difference> differences{};
   std::optional<std::int64_t> frame{};  ///< number of its frame, if the files are sequences
+  double range = 0.0;  ///< to which limits in % refer: valueRangeOf() or valueRangeOfVectors()
+  /// The row has the lengths of vectors. Limits on errors hold for the components, as the bounds of
+  /// a conversion do; the error of a length is at most sqrt(3) times theirs.
+  bool isLengths = false;
 };
 
 struct CheckRecord {
@@ -29,7 +33,9 @@ struct CheckRecord {
   std::vector<std::string> skipped;   ///< grids that cannot be compared, with the reason
   std::vector<std::string> extra;     ///< grids of the candidate that the reference does not have
   std::vector<std::string> failures;  ///< one line for each failure
-  std::vector<std::string> notes;     ///< remarks that are not failures
+  /// Grids whose voxels cannot be compared, such as those with NaN, with the reason.
+  std::vector<std::string> unreadable;
+  std::vector<std::string> notes;  ///< remarks that are not failures
 };
 
 }  // namespace esvr::compare

@@ -70,6 +70,8 @@ const char* nameOf(DifferenceKind kind) {
       return "background";
     case DifferenceKind::kTransform:
       return "transform";
+    case DifferenceKind::kInactive:
+      return "inactive";
     case DifferenceKind::kMetadata:
       break;
   }
@@ -91,7 +93,7 @@ Json toJson(const CheckedGrid& grid) {
   const Coord at = grid.metrics.maxErrorAt;
   json["frame"] = grid.frame ? Json(*grid.frame) : Json(nullptr);
   json["max_error_at"] = {at.x, at.y, at.z};
-  json["peak"] = grid.metrics.peak;
+  json["peak"] = grid.metrics.peak > 0.0 ? Json(grid.metrics.peak) : Json();
   json["differences"] = toJson(grid.differences);
   return json;
 }
@@ -125,6 +127,7 @@ Json checkReport(const CheckOptions& options, const CheckRecord& record) {
           {"same", record.same},
           {"skipped", record.skipped},
           {"failures", record.failures},
+          {"unreadable", record.unreadable},
           {"notes", record.notes}};
 }
 

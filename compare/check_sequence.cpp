@@ -8,6 +8,7 @@
 #include "cli/frame_messages.h"
 #include "compare/compare_files.h"
 #include "compare/frame_source.h"
+#include "compare/program.h"
 #include "esvr/error.h"
 
 namespace esvr::compare {
@@ -68,6 +69,7 @@ void append(FrameNumber number, CheckRecord from, CheckRecord& to) {
   appendLines(frame, from.skipped, to.skipped);
   appendLines(frame, from.extra, to.extra);
   appendLines(frame, from.failures, to.failures);
+  appendLines(frame, from.unreadable, to.unreadable);
   appendLines(frame, from.notes, to.notes);
 }
 
@@ -84,6 +86,11 @@ CheckRecord checkSequence(const CheckOptions& options, const CancelToken& cancel
     throw UsageError(
         "a sequence can be compared with a sequence only: a pattern such as "
         "smoke.####.vdb, or an .esvr file that holds a sequence");
+  const cli::Log log(kProgram, options.verbosity);
+  for (const auto& source : {&sources.reference, &sources.candidate})
+    if (const std::string hint = (*source)->hint(options.frames ? &*options.frames : nullptr);
+        !hint.empty())
+      log.warning(hint);
   CheckRecord record;
   const auto wanted = wantedFrames(options, sources);
   noteMissing(wanted, *sources.reference, options.reference.string(), record);

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <map>
 #include <utility>
 
+#include "cli/names.h"
 #include "compare/baseline.h"
 #include "compare/limits.h"
 #include "compare/unfitted.h"
@@ -20,67 +23,119 @@ struct Pair {
   std::optional<std::size_t> candidate;
 };
 
-std::optional<std::size_t> counterpart(const GridFile& file, const std::string& uniqueName) {
-  const auto& grids = file.grids();
-  const auto it = std::find_if(grids.begin(), grids.end(), [&](const ListedGrid& grid) {
-    return grid.uniqueName == uniqueName;
-  });
-  if (it == grids.end()) return std::nullopt;
-  return std::size_t(it - grids.begin());
-}
-
-/// Pairs all grids of the reference, and records the grids that only the candidate has.
-std::vector<Pair> pairAll(const CheckOptions& options, const GridFile& reference,
-                          const GridFile& candidate, CheckRecord& record) {
-  std::vector<Pair> pairs;
-  const auto isIgnored = [&](const ListedGrid& grid) {
-    return options.ignored.contains(grid.uniqueName);
-  };
-  for (std::size_t g = 0; g < reference.grids().size(); ++g)
-    if (const ListedGrid& grid = reference.grids()[g]; !isIgnored(grid))
-      pairs.push_back({g, counterpart(candidate, grid.uniqueName)});
-  for (const auto& grid : candidate.grids())
-    if (!isIgnored(grid) && !counterpart(reference, grid.uniqueName)) {
-      record.extra.push_back(grid.uniqueName);
-      record.failures.push_back("grid \"" + grid.uniqueName + "\" is not in the reference");
+/// Grids that --ignore-grids names are left out. Where both files have the same number of grids of a name,
+/// it stands for the grids with this number in both; where the candidate has fewer, for that of the
+/// reference, whose other grids are then paired with those of the candidate.
+class Pairing {
+ public:
+  Pairing(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)
+      : options_(options), reference_(reference), candidate_(candidate) {
+    std::vector<GridTraits> traits;
+    std::vector<std::size_t> places;
+    const auto counts = countsOf(reference), others = countsOf(candidate);
+    for (std::size_t g = 0; g < reference.grids().size(); ++g) {
+      const std::string& name = reference.grids()[g].name;
+      const auto other = others.find(name);
+      const bool isOneOfMany = other != others.end() && other->second != counts.at(name);
+      if (isOneOfMany && isIgnored(reference, g)) continue;
+      traits.push_back(reference.traits()[g]);
+      places.push_back(g);
     }
-  return pairs;
-}
+    of_.resize(reference.grids().size());
+    auto ofCandidate = candidate.traits();
+    cli::addRanges(
+        ofCandidate, [&](std::size_t g) { return rangeOf(reference, places[g]); }, traits);
+    cli::addRanges(
+        traits, [&](std::size_t g) { return rangeOf(candidate, g); }, ofCandidate);
+    const auto pairs = pairGrids(traits, ofCandidate);
+    for (std::size_t p = 0; p < pairs.size(); ++p) of_[places[p]] = pairs[p];
+  }
+
+  /// The grid of the candidate that is the same as one of the reference.
+  [[nodiscard]] std::optional<std::size_t> of(std::size_t reference) const {
+    return of_[reference];
+  }
+
+  /// Pairs all grids of the reference, and records the grids that only the candidate has.
+  [[nodiscard]] std::vector<Pair> all(CheckRecord& record) const {
+    std::vector<Pair> pairs;
+    std::vector<bool> isPaired(candidate_.grids().size(), false);
+    for (std::size_t g = 0; g < reference_.grids().size(); ++g) {
+      if (of_[g]) isPaired[*of_[g]] = true;
+      if (!isIgnored(reference_, g)) pairs.push_back({g, of_[g]});
+    }
+    for (std::size_t g = 0; g < isPaired.size(); ++g) {
+      if (isPaired[g] || isIgnored(candidate_, g)) continue;
+      const std::string& name = candidate_.grids()[g].uniqueName;
+      record.extra.push_back(name);
+      record.failures.push_back("grid \"" + name + "\" is not in the reference");
+    }
+    return pairs;
+  }
+
+ private:
+  static std::map<std::string, std::size_t> countsOf(const GridFile& file) {
+    std::map<std::string, std::size_t> counts;
+    for (const ListedGrid& grid : file.grids()) ++counts[grid.name];
+    return counts;
+  }
+
+  /// The range of the active values of a grid.
+  static std::optional<std::array<float, 2>> rangeOf(const GridFile& file, std::size_t grid) {
+    const ListedGrid& listed = file.grids()[grid];
+    if (listed.empty || !(listed.comparable || listed.isVector)) return std::nullopt;
+    const ValueRange range = activeRange(listed.isVector ? file.readVectors(grid).components.front()
+                                                         : file.read(grid).volume);
+    return std::array{range.min, range.max};
+  }
+
+  [[nodiscard]] bool isIgnored(const GridFile& file, std::size_t grid) const {
+    return std::ranges::any_of(options_.ignored, [&](const std::string& name) {
+      return name == file.grids()[grid].name || file.names().lookUp(name) == NamedGrid{grid};
+    });
+  }
+
+  const CheckOptions& options_;
+  const GridFile &reference_, &candidate_;
+  std::vector<std::optional<std::size_t>> of_;  ///< by the place in the reference
+};
 
 /// Pairs a grid by "NAME" or "NAME=OTHER". If a grid's name contains "=", the whole text is a name.
-Pair pairNamed(const GridFile& reference, const GridFile& candidate, const std::string& wanted) {
-  const std::size_t split = counterpart(reference, wanted) ? std::string::npos : wanted.find('=');
-  const std::string name = wanted.substr(0, split);
-  const std::string other = split == std::string::npos ? wanted : wanted.substr(split + 1);
-  return {reference.find(name), candidate.find(other)};
+Pair pairNamed(const GridFile& reference, const GridFile& candidate, const Pairing& pairing,
+               const std::string& wanted) {
+  const bool isWhole = reference.names().lookUp(wanted).has_value();
+  const std::size_t split = isWhole ? std::string::npos : wanted.find('=');
+  const std::size_t place = reference.find(wanted.substr(0, split));
+  if (split != std::string::npos) return {place, candidate.find(wanted.substr(split + 1))};
+  const auto same = pairing.of(place);
+  return {place, same ? *same : candidate.find(wanted)};
 }
 
 std::vector<Pair> choosePairs(const CheckOptions& options, const GridFile& reference,
                               const GridFile& candidate, CheckRecord& record) {
-  if (options.grids.empty()) return pairAll(options, reference, candidate, record);
+  const Pairing pairing(options, reference, candidate);
+  if (options.grids.empty()) return pairing.all(record);
   std::vector<Pair> pairs;
-  for (const auto& wanted : options.grids) pairs.push_back(pairNamed(reference, candidate, wanted));
+  for (const auto& wanted : options.grids)
+    pairs.push_back(pairNamed(reference, candidate, pairing, wanted));
   return pairs;
-}
-
-std::string joinedNames(const GridFile& file) {
-  std::string list;
-  for (const auto& grid : file.grids())
-    list += (list.empty() ? "\"" : ", \"") + grid.uniqueName + '"';
-  return list.empty() ? "none" : list;
 }
 
 void requirePairs(const std::vector<Pair>& pairs, const GridFile& reference,
                   const GridFile& candidate) {
+  // A file without grids is the first frame of many simulations, and compares like any other.
+  if (reference.grids().empty() || candidate.grids().empty()) return;
   if (pairs.empty()) throw BadInput(reference.path().string() + ": no grid can be compared");
   if (std::none_of(pairs.begin(), pairs.end(), [](const Pair& p) { return p.candidate; }))
-    throw BadInput("no grid of " + reference.path().string() + " (" + joinedNames(reference) +
-                   ") is in " + candidate.path().string() + " (" + joinedNames(candidate) + ")");
+    throw BadInput("no grid of " + reference.path().string() + " (" + reference.names().list() +
+                   ") is in " + candidate.path().string() + " (" + candidate.names().list() + ")");
 }
 
 /// \throws BadInput  nothing could be compared
 void requireResults(const GridFile& reference, const CheckRecord& record) {
-  if (!record.grids.empty() || !record.same.empty() || !record.failures.empty()) return;
+  if (!record.grids.empty() || !record.same.empty() || !record.failures.empty() ||
+      !record.unreadable.empty())
+    return;
   std::string text = reference.path().string() + ": no grid can be compared";
   for (const auto& line : record.skipped) text += "\n  " + line;
   throw BadInput(text);
@@ -111,31 +166,68 @@ class Comparison {
       return;
     }
     const GridPair both{reference_, pair.reference, candidate_, *pair.candidate};
+    const bool areVectors = both.a().isVector && both.b().isVector;
     if (isRetyped(both))
       record.failures.push_back(retypedText(both));
-    else if (both.a().isVector && both.b().isVector && !haveSameBytes(both))
-      compareVectorGrids(pair, listed.uniqueName, record);
-    else if (!listed.comparable || (listed.empty && options_.grids.empty()))
+    else if (!(listed.comparable || areVectors) || listed.empty)
       compareUnfitted(options_, both, record);
+    else if (haveSameBytes(both) && !(temporal_ && hasFigures(both)))
+      addSame(both, record);
     else
-      record.grids.push_back(compare(pair, listed.uniqueName, record));
+      measure(pair, both, record);
   }
-  [[nodiscard]] const std::vector<double>& ranges() const { return ranges_; }
 
  private:
+  /// True if grids of the same bytes get a row of figures. Those that an .esvr file carries are
+  /// listed with the other carried grids.
+  static bool hasFigures(const GridPair& both) {
+    return both.a().comparable && !both.reference.esvr() && !both.candidate.esvr();
+  }
+
+  /// Two grids of the same bytes are equal, whatever their values, and need not be read.
+  void addSame(const GridPair& both, CheckRecord& record) const {
+    if (!hasFigures(both)) {
+      record.same.push_back("grid \"" + both.a().uniqueName + "\": the same bytes (" +
+                            both.a().valueType + ")");
+      return;
+    }
+    CheckedGrid grid{.name = both.a().uniqueName, .candidateName = both.b().uniqueName};
+    VolumeMetrics exact;
+    exact.psnrBox = exact.psnrActive = std::numeric_limits<double>::infinity();
+    if (ssim_) exact.ssim = 1.0;
+    grid.figures = figuresOf(exact);
+    const auto distance = std::size_t(FigureId::kMeshDistance);
+    if (options_.limits[distance]) grid.figures[distance] = 0.0;
+    record.grids.push_back(std::move(grid));
+  }
+
+  /// A grid that cannot be measured, because a value is not finite for example, does not keep the
+  /// others from being compared.
+  void measure(const Pair& pair, const GridPair& both, CheckRecord& record) {
+    const std::string& name = both.a().uniqueName;
+    try {
+      if (both.a().isVector)
+        compareVectorGrids(pair, name, record);
+      else
+        record.grids.push_back(compare(pair, name, record));
+    } catch (const BadInput& why) {
+      record.unreadable.push_back("grid \"" + name + "\" cannot be compared: " + why.what());
+    }
+  }
+
   CheckedGrid compare(const Pair& pair, const std::string& name, CheckRecord& record) {
     const VolumeGrid a = reference_.read(pair.reference);
     const VolumeGrid b = candidate_.read(*pair.candidate);
     CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
-    requireRange(a.volume, name);
     requireOverlap(a.volume, b.volume, name, record);
     grid.metrics = compareVolumes(a.volume, b.volume,
                                   {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
     grid.figures = figuresOf(grid.metrics);
     addMeshDistance(grid, a, b);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
-    addRange(a.volume);
-    addTemporal(grid, a.volume, b.volume);
+    addDifferences(compareInactive(a.inactive, b.inactive), grid);
+    grid.range = valueRangeOf(a.volume);
+    addTemporal(grid, {a.volume, b.volume, grid.metrics.peak});
     return grid;
   }
 
@@ -144,22 +236,34 @@ class Comparison {
     const VectorGrid a = reference_.readVectors(pair.reference);
     const VectorGrid b = candidate_.readVectors(*pair.candidate);
     const std::string& other = candidate_.grids()[*pair.candidate].uniqueName;
-    const SparseVolume lengths = magnitudeOf(a.components);
-    requireRange(lengths, name);
-    requireOverlap(lengths, magnitudeOf(b.components), name, record);
+    const SparseVolume lengths = magnitudeOf(a.components), others = magnitudeOf(b.components);
+    requireOverlap(lengths, others, name, record);
     const VectorMetrics metrics = compareVectors(
         a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
-    record.grids.push_back({name, other, metrics.magnitude, figuresOf(metrics.magnitude),
-                            compareDescriptors(a.descriptor, b.descriptor)});
-    addRange(lengths);
-    addTemporal(record.grids.back(), lengths, magnitudeOf(b.components));
+    const double range = valueRangeOfVectors(a.components), peak = metrics.magnitude.peak;
+    record.grids.push_back({.name = name,
+                            .candidateName = other,
+                            .metrics = metrics.magnitude,
+                            .figures = figuresOf(metrics.magnitude),
+                            .differences = compareDescriptors(a.descriptor, b.descriptor),
+                            .range = range,
+                            .isLengths = true});
+    addDifferences(compareInactive(a.inactive, b.inactive), record.grids.back());
+    addTemporal(record.grids.back(), {lengths, others, peak});
     for (std::size_t c = 0; c < kComponents; ++c) {
       const VolumeMetrics& m = metrics.components[c];
-      record.grids.push_back({componentName(name, c), componentName(other, c), m, figuresOf(m),
-                              backgroundDifferences(a, b, c)});
-      addRange(a.components[c]);
-      addTemporal(record.grids.back(), a.components[c], b.components[c]);
+      record.grids.push_back({.name = reference_.names().ofComponent(pair.reference, c),
+                              .candidateName = candidate_.names().ofComponent(*pair.candidate, c),
+                              .metrics = m,
+                              .figures = figuresOf(m),
+                              .differences = backgroundDifferences(a, b, c),
+                              .range = range});
+      addTemporal(record.grids.back(), {a.components[c], b.components[c], peak});
     }
+  }
+
+  static void addDifferences(const std::vector<Difference>& more, CheckedGrid& grid) {
+    grid.differences.insert(grid.differences.end(), more.begin(), more.end());
   }
 
   /// The difference of the backgrounds of a component. That of x is one of the descriptors.
@@ -180,14 +284,9 @@ class Comparison {
       grid.figures[figure] = meshDistance(a, b).voxels;
   }
 
-  void addTemporal(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b) const {
+  void addTemporal(CheckedGrid& grid, const ComparedVolumes& volumes) const {
     if (temporal_)
-      grid.figures[std::size_t(FigureId::kPsnrTemporal)] = temporal_->compare(grid.name, a, b);
-  }
-
-  void addRange(const SparseVolume& reference) {
-    const ValueRange range = activeRange(reference);
-    ranges_.push_back(double(range.max) - double(range.min));
+      grid.figures[std::size_t(FigureId::kPsnrTemporal)] = temporal_->compare(grid.name, volumes);
   }
 
   static void requireOverlap(const SparseVolume& a, const SparseVolume& b, const std::string& name,
@@ -199,21 +298,10 @@ class Comparison {
                                    : "the active voxels lie in boxes that do not meet"));
   }
 
-  /// Checks that the reference has an active voxel and a peak, without which PSNR and SSIM are not
-  /// defined.
-  void requireRange(const SparseVolume& reference, const std::string& name) const {
-    const std::string grid = reference_.path().string() + ": grid \"" + name + "\": ";
-    if (activeVoxelCount(reference) == 0) throw BadInput(grid + "it has no active voxel");
-    const ValueRange range = activeRange(reference);
-    if (!options_.peak && range.min == 0.0f && range.max == 0.0f)
-      throw BadInput(grid + "every active voxel is 0, so PSNR has no peak; set it with --peak");
-  }
-
   const CheckOptions& options_;
   const GridFile &reference_, &candidate_;
   TemporalComparison* temporal_;  ///< null: the files are no frames
   bool ssim_ = false;
-  std::vector<double> ranges_;
 };
 
 }  // namespace
@@ -223,6 +311,8 @@ CheckRecord compareFiles(const CheckOptions& options, const FilePair& files,
   CheckRecord record;
   record.candidateBytes = files.candidate.bytes();
   const auto pairs = choosePairs(options, files.reference, files.candidate, record);
+  if (files.reference.grids().empty() && files.candidate.grids().empty())
+    record.same.emplace_back("no grid in either file");
   requirePairs(pairs, files.reference, files.candidate);
   record.fileDifferences = compareMetadata(files.reference.metadata(), files.candidate.metadata(),
                                            std::array<std::string, 1>{kWriterKey});
@@ -232,7 +322,7 @@ CheckRecord compareFiles(const CheckOptions& options, const FilePair& files,
     comparison.run(pair, record);
   }
   requireResults(files.reference, record);
-  judgeLimits(options, comparison.ranges(), record);
+  judgeLimits(options, record);
   judgeDifferences(options, record);
   return record;
 }

@@ -18,9 +18,9 @@ namespace {
 constexpr std::uint64_t kParts[] = {10, 20, 50, 100, 200, 400};
 
 void checkFiles(const CurvesOptions& options) {
-  for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0)) {
-    cli::requireDistinct({options.table.reference, file});
-    for (const auto& candidate : options.table.candidates) cli::requireDistinct({candidate, file});
+  const auto files = curveFiles(options.prefix, options.table.images.views > 0);
+  cli::requireSeparate(inputsOf(options.table), files);
+  for (const auto& file : files) {
     cli::checkOutput(file, {".csv", ".json", ".html", ".svg", ".png"}, options.overwrite);
   }
 }
@@ -84,6 +84,7 @@ void curves(const CurvesOptions& options) {
   TableRecord record = files.record();
   const TableScene scene = files.scene();
   CurvesRun(scene, record, log).run();
+  const Completion completion;  // finished rows are written after an interruption, too
   writeCurves(options.prefix, {options.table.reference, record, options.table.commandLine},
               options.overwrite);
   for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0))

@@ -63,7 +63,8 @@ std::map<std::string, const MetaItem*> byName(std::span<const MetaItem> items) {
 }
 
 Difference metadataDifference(const std::string& name, const std::string& how) {
-  return {DifferenceKind::kMetadata, "metadata \"" + name + "\": " + how};
+  return {DifferenceKind::kMetadata,
+          "metadata \"" + shownText(name, LineEnds::kReplace) + "\": " + how};
 }
 
 }  // namespace
@@ -88,6 +89,17 @@ std::vector<Difference> compareMetadata(std::span<const MetaItem> reference,
     if (!isIgnored(name) && !a.contains(name))
       differences.push_back(metadataDifference(name, "not in the reference"));
   return differences;
+}
+
+std::vector<Difference> compareInactive(const InactiveValues& reference,
+                                        const InactiveValues& candidate) {
+  if (reference == candidate) return {};
+  const auto text = [](const InactiveValues& values) {
+    return values.count() == 0 ? "none" : toText(values);
+  };
+  return {{DifferenceKind::kInactive,
+           "inactive values that are not the background: " + text(reference) +
+               ", in the candidate " + text(candidate)}};
 }
 
 std::vector<Difference> compareDescriptors(const GridDescriptor& a, const GridDescriptor& b) {

@@ -6,10 +6,19 @@
 #include <vector>
 
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 
 namespace esvr::compare {
 
-enum class DifferenceKind { kName, kClass, kValueType, kBackground, kTransform, kMetadata };
+enum class DifferenceKind {
+  kName,
+  kClass,
+  kValueType,
+  kBackground,
+  kTransform,
+  kMetadata,
+  kInactive  ///< values of inactive voxels and tiles
+};
 
 struct Difference {
   DifferenceKind kind = DifferenceKind::kName;
@@ -22,6 +31,10 @@ struct Difference {
 /// the class or the value type are ignored.
 [[nodiscard]] std::vector<Difference> compareDescriptors(const GridDescriptor& reference,
                                                          const GridDescriptor& candidate);
+
+/// The difference of the values of inactive voxels; nothing if they are the same.
+[[nodiscard]] std::vector<Difference> compareInactive(const InactiveValues& reference,
+                                                      const InactiveValues& candidate);
 
 /// Lists the items that only one side has or that have different values, except for `ignored`.
 [[nodiscard]] std::vector<Difference> compareMetadata(std::span<const MetaItem> reference,

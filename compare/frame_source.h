@@ -21,8 +21,15 @@ class FrameSource {
   [[nodiscard]] static std::unique_ptr<FrameSource> in(const std::string& path,
                                                        const cli::HostMemory& memory);
 
+  /// Says which names look like frames of the pattern and are none; empty if there are none.
+  /// \param wanted  the numbers in question; null: all
+  [[nodiscard]] std::string hint(const std::vector<cli::FrameNumber>* wanted) const {
+    const std::string text = listing_.hint(wanted);
+    return text.empty() ? text : pattern_.text() + ": " + text;
+  }
+
   /// The numbers of the frames, increasing.
-  [[nodiscard]] const std::vector<cli::FrameNumber>& numbers() const { return numbers_; }
+  [[nodiscard]] const std::vector<cli::FrameNumber>& numbers() const { return listing_.frames; }
 
   /// Reads a frame. \throws BadInput, MemoryExceeded  as for readEsvr and inspectVdb
   [[nodiscard]] GridFile open(cli::FrameNumber number);
@@ -36,7 +43,7 @@ class FrameSource {
 
   cli::FramePattern pattern_;
   cli::HostMemory memory_;
-  std::vector<cli::FrameNumber> numbers_;
+  cli::FrameListing listing_;               ///< of a file with all frames: its frames only
   std::unique_ptr<SequenceReader> reader_;  ///< null: each frame is a file
 };
 

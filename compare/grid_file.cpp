@@ -5,16 +5,11 @@
 #include "cli/names.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 
 namespace esvr::compare {
 namespace {
 
-std::vector<std::string> storedNames(const std::vector<ListedGrid>& grids) {
-  std::vector<std::string> names;
-  for (const auto& grid : grids) names.push_back(grid.name);
-  return names;
-}
+constexpr std::uint64_t kVolumes = 2;  // the reference and the candidate
 
 ListedGrid listedGrid(const StoredGrid& grid) {
   return {.name = grid.descriptor.name,
@@ -49,13 +44,14 @@ ListedGrid listedGrid(const EsvrFile& file, const GridOfFile& grid) {
 }  // namespace
 
 GridFile::GridFile(std::filesystem::path path, cli::HostMemory memory)
-    : path_(std::move(path)), memory_(std::move(memory)) {
+    : path_(std::move(path)), watched_({path_}), memory_(std::move(memory)) {
   if (path_.extension() != ".esvr") {
     listVdb();
     return;
   }
   esvr_ = std::make_unique<EsvrFile>(readEsvr(path_, {memory_.maxBytes, memory_.voxels}));
   bytes_ = inspectEsvr(path_).fileBytes;
+  watched_.requireUnchanged();
   listEsvr();
 }
 
@@ -70,8 +66,15 @@ void GridFile::listEsvr() {
     grids_.push_back(listedGrid(*esvr_, grid));
     grids_.back().ofEsvr = grid;
   }
-  const auto unique = uniqueNames(storedNames(grids_));
-  for (std::size_t g = 0; g < grids_.size(); ++g) grids_[g].uniqueName = unique[g];
+  traits_ = cli::traitsOf(*esvr_);
+  nameGrids();
+}
+
+void GridFile::nameGrids() {
+  std::vector<std::string> names;
+  for (const auto& grid : grids_) names.push_back(grid.name);
+  names_.emplace(std::move(names));
+  for (std::size_t g = 0; g < grids_.size(); ++g) grids_[g].uniqueName = names_->unique(g);
 }
 
 void GridFile::listVdb() {
@@ -80,18 +83,18 @@ void GridFile::listVdb() {
   metadata_ = std::move(summary.metadata);
   for (const auto& grid : summary.grids) {
     grids_.push_back({.name = grid.name,
-                      .uniqueName = grid.uniqueName,
                       .comparable = grid.isScalar,
                       .empty = grid.activeVoxels == 0,
                       .valueType = grid.valueType,
+                      .storedBytes = grid.storedBytes,
                       .isVector = grid.isVector});
     whyNoBytes_.push_back(grid.whyNotCarried);
   }
+  traits_ = cli::traitsOf(summary);
+  nameGrids();
 }
 
-std::size_t GridFile::find(const std::string& name) const {
-  return findGrid(storedNames(grids_), name, path_);
-}
+std::size_t GridFile::find(const std::string& name) const { return names_->findWhole(name, path_); }
 
 std::size_t GridFile::firstWithVoxels() const {
   for (std::size_t g = 0; g < grids_.size(); ++g)
@@ -99,19 +102,24 @@ std::size_t GridFile::firstWithVoxels() const {
   throw BadInput(path_.string() + ": no grid of type float or double has an active voxel");
 }
 
+bool GridFile::hasBytes(std::size_t g) const {
+  return esvr_ ? grids_[g].ofEsvr.isCarried : whyNoBytes_[g].empty();
+}
+
 std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
-  const GridOfFile& place = grids_[g].ofEsvr;
-  if (esvr_) return place.isCarried ? std::optional(esvr_->carried[place.index]) : std::nullopt;
-  if (!whyNoBytes_[g].empty()) return std::nullopt;
+  if (!hasBytes(g)) return std::nullopt;
+  if (esvr_) return esvr_->carried[grids_[g].ofEsvr.index];
   auto grids =
       readCarried(path_, {&g, 1}, {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
-  return std::move(grids.front());
+  return ofSameFile(std::move(grids.front()));
 }
 
 VolumeGrid GridFile::read(std::size_t g) const {
-  const ReadOptions options{
-      .allowEmpty = true, .maxBytes = memory_.maxBytes, .memory = memory_.voxels};
-  if (!esvr_) return readGrid(path_, grids_[g].uniqueName, options);
+  const ReadOptions options{.allowEmpty = true,
+                            .maxBytes = memory_.maxBytes,
+                            .memory = memory_.voxels,
+                            .volumes = kVolumes};
+  if (!esvr_) return ofSameFile(readGrid(path_, g, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
   VolumeGrid grid;
@@ -122,8 +130,9 @@ VolumeGrid GridFile::read(std::size_t g) const {
 }
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
-  const ReadOptions options{.maxBytes = memory_.maxBytes, .memory = memory_.voxels};
-  if (!esvr_) return readVector(path_, grids_[g].uniqueName, options);
+  const ReadOptions options{
+      .maxBytes = memory_.maxBytes, .memory = memory_.voxels, .volumes = kVolumes};
+  if (!esvr_) return ofSameFile(readVector(path_, g, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readVector(esvr_->carried[place.index], options);
   const StoredVector& vector = esvr_->vectors.at(place.index);

@@ -9,7 +9,9 @@
 #include <vector>
 
 #include "cli/host_memory.h"
+#include "cli/input_files.h"
 #include "esvr/container.h"
+#include "esvr/grid_names.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::compare {
@@ -17,12 +19,13 @@ namespace esvr::compare {
 /// An entry of a file's list of grids.
 struct ListedGrid {
   std::string name{};        ///< stored name
-  std::string uniqueName{};  ///< name with "[i]" if several grids share it
+  std::string uniqueName{};  ///< GridNames::unique
   bool comparable = true;    ///< true if the values are floats or doubles
   bool empty = false;        ///< true if there is no active voxel
   std::string valueType;
-  GridOfFile ofEsvr{};    ///< place in the content of an .esvr file
-  bool isVector = false;  ///< true if readVectors can read it
+  std::uint64_t storedBytes = 0;  ///< bytes of the grid in a .vdb file
+  GridOfFile ofEsvr{};            ///< place in the content of an .esvr file
+  bool isVector = false;          ///< true if readVectors can read it
 };
 
 /// An .esvr file is recognised by its extension, a .vdb or .nvdb file by its first bytes.
@@ -42,10 +45,15 @@ class GridFile {
   /// The content of an .esvr file; null for other files.
   [[nodiscard]] const EsvrFile* esvr() const { return esvr_.get(); }
 
-  /// Index of a grid by the name that a user gives. \throws BadInput  as for findGrid
+  /// Index of a grid by the name that a user gives. \throws BadInput  as for GridNames::findWhole
   [[nodiscard]] std::size_t find(const std::string& name) const;
+  [[nodiscard]] const GridNames& names() const { return *names_; }
+  /// What tells grids of one name apart, in the order of grids().
+  [[nodiscard]] const std::vector<GridTraits>& traits() const { return traits_; }
   /// Index of the first comparable grid with an active voxel. \throws BadInput  there is none
   [[nodiscard]] std::size_t firstWithVoxels() const;
+  /// Whether bytesOf() has the bytes of a grid.
+  [[nodiscard]] bool hasBytes(std::size_t grid) const;
   /// A grid as the bytes that OpenVDB wrote; nothing if the file does not have them, because the
   /// grid was fitted or the file is a .nvdb. \throws BadInput, MemoryExceeded  as for readCarried
   [[nodiscard]] std::optional<CarriedGrid> bytesOf(std::size_t grid) const;
@@ -58,11 +66,22 @@ class GridFile {
  private:
   void listEsvr();
   void listVdb();
+  void nameGrids();
+
+  /// The list and each grid of a VDB file are read at different times.
+  template <class Value>
+  [[nodiscard]] Value ofSameFile(Value value) const {
+    watched_.requireUnchanged();
+    return value;
+  }
 
   std::filesystem::path path_;
+  cli::WatchedInputs watched_;
   cli::HostMemory memory_;
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;
+  std::vector<GridTraits> traits_;
+  std::optional<GridNames> names_;
   std::vector<std::string> whyNoBytes_;  ///< why bytesOf() has no figures; VDB files only
   std::vector<MetaItem> metadata_;
   std::unique_ptr<EsvrFile> esvr_;

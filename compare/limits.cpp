@@ -7,13 +7,13 @@ bool misses(const Figure& figure, double value, double limit) {
   return figure.higherIsBetter ? value < limit : value > limit;
 }
 
-void judgeGrid(const CheckOptions& options, double range, const CheckedGrid& grid,
+void judgeGrid(const CheckOptions& options, const CheckedGrid& grid,
                std::vector<std::string>& failures) {
   for (const Figure& figure : allFigures()) {
     const auto& bound = options.limits[std::size_t(figure.id)];
     const auto value = valueOf(grid.figures, figure);
-    if (!bound || !value) continue;
-    const double limit = bound->absolute(range);
+    if (!bound || !value || (figure.inValueUnits && grid.isLengths)) continue;
+    const double limit = bound->absolute(grid.range);
     if (misses(figure, *value, limit))
       failures.push_back("grid \"" + grid.name + "\": " + figure.header + " " +
                          textOf(figure, *value) + ", --" + figure.option + " " +
@@ -23,9 +23,8 @@ void judgeGrid(const CheckOptions& options, double range, const CheckedGrid& gri
 
 }  // namespace
 
-void judgeLimits(const CheckOptions& options, std::span<const double> ranges, CheckRecord& record) {
-  for (std::size_t g = 0; g < record.grids.size(); ++g)
-    judgeGrid(options, ranges[g], record.grids[g], record.failures);
+void judgeLimits(const CheckOptions& options, CheckRecord& record) {
+  for (const CheckedGrid& grid : record.grids) judgeGrid(options, grid, record.failures);
 }
 
 void judgeBytes(const CheckOptions& options, CheckRecord& record) {

@@ -7,8 +7,7 @@
 namespace esvr::compare {
 
 /// Appends a line to the record's failures for every limit that a grid misses.
-/// \param ranges  range of the reference's values by grid, for limits that are shares of it
-void judgeLimits(const CheckOptions& options, std::span<const double> ranges, CheckRecord& record);
+void judgeLimits(const CheckOptions& options, CheckRecord& record);
 
 /// Appends a line if the file is larger than allowed.
 void judgeBytes(const CheckOptions& options, CheckRecord& record);

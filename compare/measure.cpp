@@ -82,12 +82,7 @@ std::vector<SearchStep> searchOf(const ExternalMatch& match) {
 /// is not carried, it is taken.
 std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
                     const std::string& name) {
-  if (file.grids.size() == 1) return 0;
-  const GridOfFile grid = gridsInOrder(file)[findGrid(namesInOrder(file), name, path)];
-  if (grid.isCarried)
-    throw BadInput(path.string() + ": grid \"" + name + "\" is carried unchanged");
-  if (grid.isVector) throw BadInput(path.string() + ": grid \"" + name + "\" has vectors");
-  return grid.index;
+  return file.grids.size() == 1 ? 0 : findStored(file, name, path);
 }
 
 StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::string& name) {

@@ -15,7 +15,8 @@ void addMeasureOptions(cli::po::options_description& options) {
      "box x0,y0,z0,x1,y1,z1 over which figures are measured (default: the bounding box of "
      "the reference's active voxels)")
     ("peak", value<double>()->value_name("P"),
-     "peak of the PSNR (default: the reference's largest value)");
+     "peak of the PSNR (default: the range of the reference's values, "
+     "which is the largest value of a density; docs/compare.md)");
   // clang-format on
 }
 

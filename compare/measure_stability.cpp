@@ -7,6 +7,7 @@
 #include "esvr/device_bricks.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/vector_grid.h"
 
 namespace esvr::compare {
@@ -42,7 +43,8 @@ class GridMeasurement {
     constexpr double kBytesOfBrick = 64.0, kBytesOfEllipsoid = 512.0;
     requireWithinMemory(kBytesOfBrick * estimateDecode(grid_).bricks +
                             kBytesOfEllipsoid * double(grid_.field.ellipsoidCount()),
-                        run_.request.memory.maxBytes, "grid '" + grid_.descriptor.name + "'");
+                        run_.request.memory.maxBytes,
+                        "grid '" + shownName(grid_.descriptor.name) + "'");
   }
 
   /// Compares a device with the first one, on the same bricks.
@@ -70,7 +72,7 @@ GridStability measureGrid(const StabilityRun& run, const StoredGrid& grid,
                           const std::string& name) {
   GridStability result{.name = name,
                        .ellipsoids = grid.field.ellipsoidCount(),
-                       .peak = cli::largestMagnitude(grid),
+                       .peak = cli::peakOfSource(grid),
                        .corrected = grid.residual.has_value()};
   if (grid.voxels) result.whyNone = "it is stored as voxels";
   if (result.ellipsoids == 0 && result.whyNone.empty()) result.whyNone = "it has no ellipsoids";
@@ -110,8 +112,8 @@ std::vector<GridStability> measureFile(const StabilityRun& run, const GridFile& 
       results.push_back(measureGrid(run, esvr.grids[index], name));
     else
       for (std::size_t c = 0; c < kComponents; ++c)
-        results.push_back(
-            measureGrid(run, componentsOf(esvr, esvr.vectors[index])[c], componentName(name, c)));
+        results.push_back(measureGrid(run, componentsOf(esvr, esvr.vectors[index])[c],
+                                      file.names().ofComponent(g, c)));
   }
   return results;
 }

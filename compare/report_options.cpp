@@ -31,18 +31,15 @@ ReportFiles reportFiles(const cli::Arguments& a) {
 }
 
 void checkReportFiles(const ReportFiles& files, const std::vector<std::filesystem::path>& inputs) {
-  std::vector<std::filesystem::path> outputs;
+  cli::requireSeparate(inputs, {files.json, files.markdown, files.csv, files.html});
   const auto check = [&](const std::string& file, const char* extension) {
     if (file.empty() || file == cli::kStandardOutput) return;
-    outputs.emplace_back(file);
-    for (const auto& input : inputs) cli::requireDistinct({input, file});
     cli::checkOutput(file, {extension}, files.overwrite);
   };
   check(files.json, ".json");
   check(files.markdown, ".md");
   check(files.csv, ".csv");
   check(files.html, ".html");
-  cli::requireDistinct(outputs);
 }
 
 }  // namespace esvr::compare

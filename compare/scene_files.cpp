@@ -13,15 +13,6 @@ VolumeGrid readReference(const GridFile& file, std::size_t place) {
   return reference;
 }
 
-double choosePeak(const TableOptions& options, const VolumeGrid& reference) {
-  if (options.peak) return *options.peak;
-  const ValueRange range = activeRange(reference.volume);
-  if (range.min == 0.0f && range.max == 0.0f)
-    throw BadInput(options.reference.string() +
-                   ": every active voxel is 0, so PSNR has no peak; set it with --peak");
-  return peakOf(reference.volume);
-}
-
 }  // namespace
 
 SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
@@ -31,7 +22,7 @@ SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
       place_(options.grid ? file_.find(*options.grid) : file_.firstWithVoxels()),
       reference_(readReference(file_, place_)),
       box_(options.box.value_or(activeBox(reference_.volume))),
-      peak_(choosePeak(options, reference_)) {
+      peak_(options.peak.value_or(peakOf(reference_.volume))) {
   if (options.images.views > 0)
     gallery_.emplace(options.images, reference_.volume, selectDevice(options.device),
                      folder_.path(), cancel);

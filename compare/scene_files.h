@@ -15,7 +15,7 @@ namespace esvr::compare {
 /// Owns the objects that a TableScene points to.
 class SceneFiles {
  public:
-  /// \throws BadInput  the reference has no active voxel or no peak; else as for readGrid
+  /// \throws BadInput  the reference has no active voxel; else as for readGrid
   SceneFiles(const TableOptions& options, const CancelToken& cancel);
 
   [[nodiscard]] TableScene scene() const;

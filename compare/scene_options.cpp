@@ -12,6 +12,8 @@ using cli::po::value;
 void addSceneOptions(cli::CommandLine& line) {
   line.argument("reference", "REF.vdb");
   line.repeatedArgument("candidates");
+  line.volumeInputs({"reference", "candidates"});
+  line.textInputs({"tf"});
   line.options().add_options()(
       "grid,g", value<std::string>()->value_name("NAME"),
       "grid to compare, in every file (default: the first grid with active voxels)");
@@ -26,6 +28,7 @@ void addSceneOptions(cli::CommandLine& line) {
 }
 
 void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
+  options.inputs = a.inputs;
   options.reference = a.get<std::string>("reference");
   for (const auto& candidate :
        a.find<std::vector<std::string>>("candidates").value_or(std::vector<std::string>{}))

@@ -4,12 +4,13 @@
 #include <string>
 #include <system_error>
 
+#include "cli/host_memory.h"
 #include "esvr/error.h"
 
 namespace esvr::compare {
 
 ScratchFolder::ScratchFolder() {
-  std::string pattern = std::filesystem::temp_directory_path() / "esvr-compare-XXXXXX";
+  std::string pattern = cli::scratchFolder() / "esvr-compare-XXXXXX";
   if (mkdtemp(pattern.data()) == nullptr)
     throw RuntimeFailure("cannot make a temporary folder with the pattern " + pattern);
   path_ = pattern;

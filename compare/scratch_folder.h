@@ -5,9 +5,10 @@
 
 namespace esvr::compare {
 
-/// Makes a folder in the system's temporary folder; the destructor removes it with its content.
+/// Makes a folder in that of the variable TMPDIR, or in /var/tmp; the destructor removes it with its content.
 class ScratchFolder {
  public:
+  /// \throws UsageError  TMPDIR is no folder
   /// \throws RuntimeFailure  the folder cannot be made
   ScratchFolder();
   ~ScratchFolder();

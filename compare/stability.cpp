@@ -12,6 +12,7 @@
 #include "cli/thread_limit.h"
 #include "compare/frame_source.h"
 #include "compare/measure_stability.h"
+#include "compare/program.h"
 #include "compare/stability_report.h"
 #include "esvr/error.h"
 
@@ -20,8 +21,8 @@ namespace {
 
 void checkFiles(const StabilityRequest& request) {
   if (request.report.empty() || request.report == cli::kStandardOutput) return;
+  cli::requireSeparate(cli::filesOfInput(request.file.string()), {request.report});
   cli::checkOutput(request.report, {".json"}, request.overwrite);
-  cli::requireDistinct({request.file, request.report});
 }
 
 /// The CPU, which users decode on, and the GPU that is asked for or usable.
@@ -58,6 +59,10 @@ StabilityRecord measured(const StabilityRun& run) {
   const StabilityRequest& request = run.request;
   const auto source = FrameSource::in(request.file.string(), request.memory);
   if (!source && request.frames) throw UsageError("--frames needs a sequence");
+  const cli::Log log(kProgram, request.verbosity);
+  const std::string hint =
+      source ? source->hint(request.frames ? &*request.frames : nullptr) : std::string();
+  if (!hint.empty()) log.warning(hint);
   if (!source)
     record.grids = measureFile(run, GridFile(request.file, request.memory));
   else

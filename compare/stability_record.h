@@ -23,7 +23,7 @@ struct GridStability {
   std::optional<cli::FrameNumber> frame{};
   std::string whyNone{};  ///< why there is nothing to measure; empty if there is
   std::size_t ellipsoids = 0;
-  double peak = 0.0;       ///< largest magnitude of the source's values, background included
+  double peak = 0.0;       ///< peak of the source (peakOf)
   bool corrected = false;  ///< whether a residual is added to the sum, which is not measured
   std::vector<DeviceStability> devices{};  ///< the CPU, and a GPU if it was measured
   /// Largest difference of the two devices, value units; nothing if one was measured.

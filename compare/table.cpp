@@ -95,12 +95,7 @@ class TableRun {
   RowMaker maker_;
 };
 
-void checkFiles(const TableOptions& options) {
-  std::vector<std::filesystem::path> inputs = options.candidates;
-  inputs.push_back(options.reference);
-  for (const auto& external : options.externals) inputs.push_back(external.file);
-  checkReportFiles(options.files, inputs);
-}
+void checkFiles(const TableOptions& options) { checkReportFiles(options.files, inputsOf(options)); }
 
 void tell(const TableOptions& options, const TableRecord& record) {
   writeReports(options, record);
@@ -121,6 +116,7 @@ void table(const TableOptions& options) {
     log.warning("this build has no ZFP; the table has no rows for it");
   const TableScene scene = files.scene();
   TableRun(scene, record, log).run();
+  const Completion completion;  // finished rows are written after an interruption, too
   tell(options, record);
   requireAllRows(record);
 }

@@ -198,6 +198,12 @@ void readImages(const Arguments& a, TableOptions& options) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> inputsOf(const TableOptions& options) {
+  std::vector<std::filesystem::path> inputs = options.inputs.paths;
+  for (const auto& external : options.externals) inputs.push_back(external.file);
+  return inputs;
+}
+
 std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv) {
   const auto arguments = makeCommandLine().parse(argc, argv);
   if (!arguments) return std::nullopt;

@@ -19,6 +19,7 @@
 namespace esvr::compare {
 
 struct TableOptions {
+  cli::InputFiles inputs;  ///< reference, candidates and transfer functions
   std::filesystem::path reference;
   std::vector<std::filesystem::path> candidates;
   std::optional<std::string> grid;  ///< default: the first grid with voxels
@@ -44,6 +45,9 @@ struct TableOptions {
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
 };
+
+/// All files that a run reads.
+[[nodiscard]] std::vector<std::filesystem::path> inputsOf(const TableOptions& options);
 
 /// \param argv  arguments, beginning with the command ("table")
 /// \return nothing if --help or --version was printed

@@ -74,16 +74,17 @@ void printNotes(std::span<const TableRow> rows, bool search, std::ostream& out) 
 }
 
 std::string markdown(const TableOptions& options, const TableRecord& record) {
-  std::string text = "# " + options.reference.filename().string() + "\n\n" + sceneLine(record) +
+  std::string text = "# " + report::markdownText(options.reference.filename().string()) + "\n\n" +
+                     report::markdownText(sceneLine(record)) +
                      ". Ratio to the half-float Blosc VDB.\n\n";
-  if (record.referenceCost) text += pictureLine(record) + "\n\n";
+  if (record.referenceCost) text += report::markdownText(pictureLine(record)) + "\n\n";
   if (record.interrupted) text += interruption(record) + "\n\n";
   for (const auto rows : groups(record)) {
     DataTable table = withoutEmptyColumns(dataTable(record, rows));
     table.title = rows.front().group;
     text += report::toMarkdown(table) + '\n';
   }
-  text += "Made by `" + joined(options.commandLine) + "` with\n\n";
+  text += "Made by " + report::markdownCode(joined(options.commandLine)) + " with\n\n";
   for (const auto& line : versionLines()) text += "    " + line + '\n';
   return text;
 }

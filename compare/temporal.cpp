@@ -1,5 +1,6 @@
 #include "compare/temporal.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "esvr/temporal_metrics.h"
@@ -9,13 +10,13 @@ namespace esvr::compare {
 void TemporalComparison::beginFrame() { before_ = std::exchange(current_, {}); }
 
 std::optional<double> TemporalComparison::compare(const std::string& grid,
-                                                  const SparseVolume& reference,
-                                                  const SparseVolume& candidate) {
-  current_[grid] = {reference, candidate};
-  const auto before = before_.find(grid);
-  if (before == before_.end()) return std::nullopt;
-  return temporalPsnr({before->second.reference, reference}, {before->second.candidate, candidate},
-                      {.box = options_.box, .peak = options_.peak});
+                                                  const ComparedVolumes& now) {
+  current_[grid] = {now.reference, now.candidate, now.peak};
+  const auto found = before_.find(grid);
+  if (found == before_.end()) return std::nullopt;
+  const Volumes& before = found->second;
+  return temporalPsnr({before.reference, now.reference}, {before.candidate, now.candidate},
+                      {.box = options_.box, .peak = std::max(before.peak, now.peak)});
 }
 
 }  // namespace esvr::compare

@@ -1,5 +1,7 @@
 #include "compare/unfitted.h"
 
+#include <utility>
+
 #include "esvr/sparse_volume.h"
 
 namespace esvr::compare {
@@ -24,7 +26,10 @@ void compareEmpty(const CheckOptions& options, const GridPair& pair, CheckRecord
                               " active voxels, the reference has none");
   else
     record.same.push_back(lineOf(pair) + "no active voxel in either file");
-  for (const auto& difference : compareDescriptors(a.descriptor, b.descriptor)) {
+  auto differences = compareDescriptors(a.descriptor, b.descriptor);
+  for (auto& difference : compareInactive(a.inactive, b.inactive))
+    differences.push_back(std::move(difference));
+  for (const auto& difference : differences) {
     const bool fails = options.failOn.contains(difference.kind);
     (fails ? record.failures : record.notes).push_back(lineOf(pair) + difference.text);
   }
@@ -33,6 +38,10 @@ void compareEmpty(const CheckOptions& options, const GridPair& pair, CheckRecord
 }  // namespace
 
 bool haveSameBytes(const GridPair& pair) {
+  if (!pair.reference.hasBytes(pair.ofReference) || !pair.candidate.hasBytes(pair.ofCandidate))
+    return false;
+  const bool areVdb = !pair.reference.esvr() && !pair.candidate.esvr();
+  if (areVdb && pair.a().storedBytes != pair.b().storedBytes) return false;
   const auto a = pair.reference.bytesOf(pair.ofReference);
   const auto b = pair.candidate.bytesOf(pair.ofCandidate);
   return a && b && haveSameBytes(*a, *b);

@@ -26,7 +26,8 @@ struct GridPair {
 /// The line that says how the type of a grid has changed.
 [[nodiscard]] std::string retypedText(const GridPair& pair);
 
-/// True if two grids have the same bytes in files without loss.
+/// True if two grids have the same bytes in files without loss. They are read only if both files
+/// have them.
 [[nodiscard]] bool haveSameBytes(const GridPair& pair);
 
 /// Compares two grids whose bytes are the same in files without loss. Appends a line to the

@@ -9,21 +9,21 @@
 
 namespace esvr::esvr2vdb {
 
-/// A grid of a file and the name that --grid takes: the name of the grid, with "[i]" if several
-/// grids of the file have it.
-struct NamedGrid {
+/// A grid of a file and the name that --grid takes (GridNames::unique).
+struct ListedGrid {
   GridOfFile grid;
   std::string name;
+  std::size_t place = 0;  ///< number of grids before it in the file
 };
 
 /// All grids in file order.
-[[nodiscard]] std::vector<NamedGrid> namedGrids(const EsvrFile& file);
+[[nodiscard]] std::vector<ListedGrid> listedGrids(const EsvrFile& file);
 
 /// The named grids in file order; all grids if none is named.
 /// \param path  file name for error texts
-/// \throws BadInput  a grid does not exist; the text lists the grids
-[[nodiscard]] std::vector<NamedGrid> chooseGrids(const std::filesystem::path& path,
-                                                 const EsvrFile& file,
-                                                 const std::vector<std::string>& names);
+/// \throws BadInput  a grid does not exist, or its name is ambiguous; the text lists the grids
+[[nodiscard]] std::vector<ListedGrid> chooseGrids(const std::filesystem::path& path,
+                                                  const EsvrFile& file,
+                                                  const std::vector<std::string>& wanted);
 
 }  // namespace esvr::esvr2vdb

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -7,6 +8,7 @@
 #include <variant>
 
 #include "cli/interrupts.h"
+#include "cli/names.h"
 #include "cli/output.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
@@ -24,9 +26,7 @@ using DecodedGrid = std::variant<VolumeGrid, VectorGrid>;
 
 /// Checks everything that can be checked before the work begins.
 void checkFiles(const Options& options) {
-  std::vector<std::filesystem::path> files{options.input, options.output};
-  if (options.reference) files.push_back(*options.reference);
-  cli::requireDistinct(files);
+  cli::requireSeparate(options.inputs.paths, {options.output});
   cli::checkOutput(options.output, {".vdb", ".nvdb"}, options.write.overwrite);
 }
 
@@ -50,7 +50,7 @@ const char* whyNot(const GridOfFile& grid, const Options& options) {
 void restrictToNamed(const Options& options, ReadPart& wanted) {
   wanted.grids.emplace();
   const EsvrFile file = readEsvrPart(options.input, wanted).file;
-  for (const auto& [grid, name] : chooseGrids(options.input, file, options.grids)) {
+  for (const auto& [grid, name, place] : chooseGrids(options.input, file, options.grids)) {
     if (grid.isCarried) {
       wanted.carriedBytes = true;
       continue;
@@ -76,11 +76,11 @@ EsvrFile read(const Options& options, const cli::Log& log) {
 
 /// The chosen grids that the output can hold. Says which of them are left out.
 /// \throws UsageError  a grid that it cannot hold is named
-/// \throws BadInput  no grid is left
-std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Options& options,
-                                const cli::Log& log) {
-  std::vector<NamedGrid> kept;
-  for (const NamedGrid& grid : chosen) {
+/// \throws BadInput  no grid is left, or the file has none and the output needs one
+std::vector<ListedGrid> writable(const std::vector<ListedGrid>& chosen, const Options& options,
+                                 const cli::Log& log) {
+  std::vector<ListedGrid> kept;
+  for (const ListedGrid& grid : chosen) {
     const char* why = whyNot(grid.grid, options);
     if (!why) {
       kept.push_back(grid);
@@ -93,6 +93,9 @@ std::vector<NamedGrid> writable(const std::vector<NamedGrid>& chosen, const Opti
   }
   if (kept.empty() && !chosen.empty())
     throw BadInput(options.input.string() + ": no grid is left to write");
+  if (kept.empty() && writesNano(options))
+    throw BadInput(options.input.string() +
+                   " has no grid, and a .nvdb file cannot be without one; write a .vdb file");
   return kept;
 }
 
@@ -149,7 +152,8 @@ const GridDescriptor& descriptorOf(const DecodedGrid& grid) {
 
 void tellEmpty(const DecodedGrid& grid, const cli::Log& log) {
   if (activeVoxelsOf(grid) == 0)
-    log.warning("grid \"" + descriptorOf(grid).name + "\" comes back without an active voxel");
+    log.warning("grid \"" + shownName(descriptorOf(grid).name) +
+                "\" comes back without an active voxel");
 }
 
 DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options& options,
@@ -159,13 +163,13 @@ DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options&
 }
 
 /// The grids that are not carried, in order.
-std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                    const Options& options, const cli::Log& log) {
   std::vector<DecodedGrid> grids;
   DecodeOptions decode = options.decode;
-  decode.maxBytes = options.memory.maxBytes;
+  decode.maxBytes = options.memory.maxBytes - std::min(options.memory.maxBytes, contentBytes(file));
   decode.memory = options.memory.voxels;
-  for (const NamedGrid& named : chosen) {
+  for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
     grids.push_back(decoded(file, named.grid, options, decode));
     tellEmpty(grids.back(), log);
@@ -176,11 +180,11 @@ std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<Named
 }
 
 /// All chosen grids in order. \param decoded  those that are not carried
-std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                  const std::vector<DecodedGrid>& decoded) {
   std::vector<GridToWrite> all;
   auto next = decoded.begin();
-  for (const auto& [grid, name] : chosen)
+  for (const auto& [grid, name, place] : chosen)
     if (grid.isCarried)
       all.emplace_back(&file.carried[grid.index]);
     else
@@ -199,24 +203,40 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
               std::to_string(items) + " items");
 }
 
-/// The names of the chosen grids in the output.
-std::vector<std::string> writtenNames(const EsvrFile& file, const std::vector<NamedGrid>& chosen) {
-  std::vector<std::string> names;
-  for (const auto& [grid, name] : chosen) names.push_back(nameOf(file, grid));
-  return uniqueNames(names);
+/// The range of the active values of a grid of the reference.
+std::optional<std::array<float, 2>> rangeIn(const Options& options, const GridSummary& grid,
+                                            std::size_t place) {
+  if (grid.activeVoxels == 0 || !(grid.isScalar || grid.isVector)) return std::nullopt;
+  const ReadOptions read{.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+  const VolumeGrid voxels = grid.isVector ? readComponent(*options.reference, place, 0, read)
+                                          : readGrid(*options.reference, place, read);
+  const ValueRange range = activeRange(voxels.volume);
+  return std::array{range.min, range.max};
 }
 
-/// Finds each grid that is not carried in the reference, before anything is written.
-std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<NamedGrid>& chosen,
+/// Finds each grid that is not carried in the reference, before anything is written. The file may lack
+/// grids of the reference that share a name with others.
+std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
                                        const Options& options) {
-  const auto written = writtenNames(file, chosen);
-  std::vector<std::string> referenceNames;
-  for (const auto& grid : inspectVdb(*options.reference).grids) referenceNames.push_back(grid.name);
+  const VdbSummary reference = inspectVdb(*options.reference);
+  const auto ofGrids = cli::traitsOf(file);
+  auto references = cli::traitsOf(reference);
+  cli::addRanges(
+      ofGrids, [&](std::size_t g) { return rangeIn(options, reference.grids[g], g); }, references);
+  const auto pairs = pairGrids(ofGrids, references);
+  std::vector<std::string> names;
+  for (const GridTraits& traits : references) names.push_back(traits.name);
+  const GridNames ofReference(std::move(names)), ofFile(namesInOrder(file));
   std::vector<ComparedGrid> grids;
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    if (chosen[i].grid.isCarried) continue;
-    (void)findGrid(referenceNames, chosen[i].name, *options.reference);
-    grids.push_back({chosen[i].name, written[i], chosen[i].grid.isVector});
+  for (std::size_t written = 0; written < chosen.size(); ++written) {
+    const auto& [grid, name, place] = chosen[written];
+    if (grid.isCarried) continue;
+    ComparedGrid compared{.name = name, .written = written, .isVector = grid.isVector};
+    compared.reference =
+        pairs[place] ? *pairs[place] : ofReference.findWhole(name, *options.reference);
+    for (std::size_t c = 0; c < kComponents; ++c)
+      compared.components[c] = ofFile.ofComponent(place, c);
+    grids.push_back(std::move(compared));
   }
   return grids;
 }
@@ -228,19 +248,25 @@ ReadLimits limitsOf(const Options& options) {
 }
 
 void convert(const Options& options) {
-  const cli::Interrupts interrupts;  // Ctrl-C lets a file that is being written be completed
+  const cli::Interrupts interrupts;
   checkFiles(options);
   convertFile(options, interrupts.token(), cli::Log(kProgram, options.verbosity), std::cout);
 }
 
 void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
                  std::ostream& out) {
-  convertContent(options, read(options, log), cancel, log, out);
+  // It may be read twice, for the names of the grids and for the grids.
+  const cli::WatchedInputs watched({options.input});
+  const EsvrFile file = read(options, log);
+  watched.requireUnchanged();
+  convertContent(options, file, cancel, log, out);
 }
 
 void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
   const auto chosen = writable(chooseGrids(options.input, file, options.grids), options, log);
+  cli::WatchedInputs watched;
+  if (options.reference) watched.add(*options.reference);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
   const auto grids = decodeAll(file, chosen, options, log);
@@ -248,6 +274,7 @@ void convertContent(const Options& options, const EsvrFile& file, const CancelTo
   tellLostMetadata(file, grids, options, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
   if (options.reference) printErrors(options, compared, out);
+  watched.requireUnchanged();  // the errors are those of one file
 }
 
 }  // namespace esvr::esvr2vdb

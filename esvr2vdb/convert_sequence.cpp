@@ -64,6 +64,10 @@ class FileOfFrames {
     return reader_->read(number);
   }
 
+  /// A frame needed more than its share of the memory. The later frames of its group get all of it,
+  /// too, because each change of the limit decodes the group again from its beginning.
+  bool needsAll = false;
+
  private:
   std::filesystem::path path_;
   std::unique_ptr<SequenceReader> reader_;
@@ -78,6 +82,7 @@ class SequenceDecoding {
       : options_(options),
         frames_(frames),
         cancel_(cancel),
+        watched_({options.input}),
         holders_(cli::holdersOf(frames)),
         tasks_(tasksFor(*options.sequence, frames)),
         workers_(cli::taskWorkers(options.threads, tasks_.size())),
@@ -142,12 +147,13 @@ class SequenceDecoding {
   /// Decodes a frame with its share of the memory. A frame that needs more is decoded alone.
   void decode(std::size_t i, FileOfFrames& file) {
     const std::uint64_t share = options_.memory.maxBytes / std::uint64_t(workers_);
-    try {
-      const auto part = gate_.take(share);
-      return decodeWithin(i, share, file);
-    } catch (const MemoryExceeded&) {
-      if (workers_ == 1) throw;
-    }
+    if (!file.needsAll) try {
+        const auto part = gate_.take(share);
+        return decodeWithin(i, share, file);
+      } catch (const MemoryExceeded&) {
+        if (workers_ == 1) throw;
+        file.needsAll = options_.sequence->input.isWhole();
+      }
     const auto all = gate_.takeAll();
     decodeWithin(i, options_.memory.maxBytes, file);
   }
@@ -158,14 +164,16 @@ class SequenceDecoding {
     own.memory.maxBytes = maxBytes;
     own.input = frame.input, own.output = frame.output;
     if (own.reference)
-      own.reference = cli::FramePattern::in(own.reference->string())->at(frame.number);
-    const cli::FrameFolder folder(own.output);
+      own.reference = cli::FramePattern::ofInput(own.reference->string())->toRead(frame.number);
     const cli::Log log = warnings_.logOf(frame, kProgram, own.verbosity);
     std::ostringstream table;
-    if (options_.sequence->input.isWhole())
-      convertContent(own, file.read(frame.number, limitsOf(own)), cancel_, log, table);
-    else
+    if (options_.sequence->input.isWhole()) {
+      const EsvrFile& content = file.read(frame.number, limitsOf(own));
+      watched_.requireUnchanged();
+      convertContent(own, content, cancel_, log, table);
+    } else {
       convertFile(own, cancel_, log, table);
+    }
     done_[i].table = table.str();
   }
 
@@ -198,6 +206,7 @@ class SequenceDecoding {
   const Options& options_;
   const std::vector<cli::Frame>& frames_;
   const CancelToken& cancel_;
+  const cli::WatchedInputs watched_;  ///< the file of all frames, which each task opens; or nothing
   const std::multimap<std::size_t, std::size_t> holders_;
   const std::vector<FrameIndices> tasks_;
   const int workers_;
@@ -213,8 +222,13 @@ class SequenceDecoding {
 void convertSequence(const Options& options) {
   const cli::Interrupts interrupts;
   const cli::Sequence& sequence = *options.sequence;
-  const auto frames = cli::planFrames(sequence);
-  cli::checkFrameOutputs(sequence, frames, {{".vdb", ".nvdb"}, options.write.overwrite});
+  const auto frames = cli::planFrames(sequence, cli::Log(kProgram, options.verbosity));
+  std::vector<std::filesystem::path> references;
+  if (options.reference) references = cli::filesOfInput(options.reference->string());
+  cli::checkFrameOutputs(sequence, frames,
+                         {.extensions = {".vdb", ".nvdb"},
+                          .mayExist = options.write.overwrite,
+                          .moreInputs = references});
   SequenceDecoding(options, frames, interrupts.token()).run();
 }
 

@@ -14,37 +14,43 @@ ReadOptions readingOf(const Options& options) {
   return {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
 }
 
-/// True if a written grid has no active voxel, which readGrid and readVector would refuse.
-bool isEmpty(const Options& options, const std::string& name) {
-  for (const auto& grid : inspectVdb(options.output).grids)
-    if (grid.uniqueName == name && grid.activeVoxels == 0) return true;
-  return false;
-}
+/// The two files of a comparison.
+struct ComparedFiles {
+  const Options& options;
+  VdbSummary written;
 
-VolumeMetrics compare(const Options& options, const ComparedGrid& grid) {
-  const auto read = [&](const auto& path, const std::string& name) {
-    return readGrid(path, name, readingOf(options)).volume;
+  /// True if a written grid has no active voxel, which readGrid and readVector would refuse.
+  [[nodiscard]] bool isEmpty(const ComparedGrid& grid) const {
+    return written.grids.at(grid.written).activeVoxels == 0;
+  }
+};
+
+VolumeMetrics compare(const ComparedFiles& files, const ComparedGrid& grid) {
+  const Options& options = files.options;
+  const auto read = [&](const auto& path, std::size_t place) {
+    return readGrid(path, place, readingOf(options)).volume;
   };
-  const SparseVolume reference = read(*options.reference, grid.name);
+  const SparseVolume reference = read(*options.reference, grid.reference);
   const SparseVolume written =
-      isEmpty(options, grid.writtenName) ? SparseVolume{} : read(options.output, grid.writtenName);
+      files.isEmpty(grid) ? SparseVolume{} : read(options.output, grid.written);
   return compareVolumes(reference, written, {.box = options.box, .ssim = true});
 }
 
-VectorMetrics compareVectorGrid(const Options& options, const ComparedGrid& grid) {
-  const auto read = [&](const auto& path, const std::string& name) {
-    return readVector(path, name, readingOf(options)).components;
+VectorMetrics compareVectorGrid(const ComparedFiles& files, const ComparedGrid& grid) {
+  const Options& options = files.options;
+  const auto read = [&](const auto& path, std::size_t place) {
+    return readVector(path, place, readingOf(options)).components;
   };
-  const VectorVolume reference = read(*options.reference, grid.name);
+  const VectorVolume reference = read(*options.reference, grid.reference);
   const VectorVolume written =
-      isEmpty(options, grid.writtenName) ? VectorVolume{} : read(options.output, grid.writtenName);
+      files.isEmpty(grid) ? VectorVolume{} : read(options.output, grid.written);
   return compareVectors(reference, written, {.box = options.box, .ssim = true});
 }
 
 std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
   return {name,
-          cli::decibels(m.psnrBox),
           cli::decibels(m.psnrActive),
+          cli::decibels(m.psnrBox),
           cli::shortNumber(m.maxError),
           cli::shortNumber(m.p999Error),
           cli::shortNumber(*m.ssim),
@@ -54,21 +60,22 @@ std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
 }
 
 /// Adds a row, or for vectors one for their lengths and one for each component.
-void addRows(const Options& options, const ComparedGrid& grid, cli::Table& table) {
-  if (!grid.isVector) return table.add(row(grid.name, compare(options, grid)));
-  const VectorMetrics metrics = compareVectorGrid(options, grid);
+void addRows(const ComparedFiles& files, const ComparedGrid& grid, cli::Table& table) {
+  if (!grid.isVector) return table.add(row(grid.name, compare(files, grid)));
+  const VectorMetrics metrics = compareVectorGrid(files, grid);
   table.add(row(grid.name, metrics.magnitude));
   for (std::size_t c = 0; c < kComponents; ++c)
-    table.add(row(componentName(grid.name, c), metrics.components[c]));
+    table.add(row(grid.components[c], metrics.components[c]));
 }
 
 }  // namespace
 
 void printErrors(const Options& options, const std::vector<ComparedGrid>& grids,
                  std::ostream& out) {
-  cli::Table table({"grid", "PSNR box", "active", "max error", "p99.9 error", "SSIM", "IoU",
+  cli::Table table({"grid", "PSNR active", "PSNR box", "max error", "p99.9 error", "SSIM", "IoU",
                     "mass ref", "mass"});
-  for (const auto& grid : grids) addRows(options, grid, table);
+  const ComparedFiles files{options, inspectVdb(options.output)};
+  for (const auto& grid : grids) addRows(files, grid, table);
   table.print(out);
 }
 

@@ -36,10 +36,14 @@ void list(const Options& options);
 /// Prints the frames of a file that holds a sequence.
 void listSequence(const Options& options);
 
+/// Prints a row for the file of each frame of a pattern.
+/// \throws Error  the failure of the first file that cannot be read, after the others were listed
+void listFrames(const Options& options, const cli::FramePattern& pattern);
+
 /// Prints the grids of a .vdb or .nvdb file.
 void listVdb(const Options& options);
 
-/// Reads the whole file and prints OK.
+/// Reads the whole file, or those of all frames of a pattern, and prints OK.
 /// \throws BadInput  the file is damaged (the text says where, and names each frame that is lost)
 void check(const Options& options);
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <iostream>
+#include <map>
 
 #include "cli/listing.h"
 #include "cli/names.h"
@@ -29,8 +30,9 @@ struct Listing {
   EsvrFile file;
   std::vector<std::uint64_t> ellipsoids;  ///< number of ellipsoids of each of the file's grids
   EsvrSummary summary;
-  std::vector<NamedGrid> grids;    ///< in file order
-  std::vector<NamedGrid> parts{};  ///< the same, with the components in place of vectors
+  std::vector<ListedGrid> grids;    ///< in file order
+  std::vector<ListedGrid> parts{};  ///< the same, with the components in place of vectors
+  std::map<std::size_t, std::string> names{};  ///< of the parts, by their numbers in the summary
 
   /// The number of a grid in the summary.
   [[nodiscard]] std::size_t numberOf(const GridOfFile& grid) const {
@@ -44,16 +46,18 @@ const char* purposeOf(const Field& field, std::uint64_t ellipsoids) {
 }
 
 /// The grids and the components of vectors.
-std::vector<NamedGrid> withComponents(const EsvrFile& file, const std::vector<NamedGrid>& grids) {
-  std::vector<NamedGrid> parts;
-  for (const NamedGrid& named : grids) {
+std::vector<ListedGrid> withComponents(const EsvrFile& file, const std::vector<ListedGrid>& grids) {
+  const GridNames names(namesInOrder(file));
+  std::vector<ListedGrid> parts;
+  for (const ListedGrid& named : grids) {
     if (!named.grid.isVector) {
       parts.push_back(named);
       continue;
     }
     for (std::size_t c = 0; c < kComponents; ++c)
-      parts.push_back(
-          {{false, file.vectors[named.grid.index].first + c}, componentName(named.name, c)});
+      parts.push_back({{false, file.vectors[named.grid.index].first + c},
+                       names.ofComponent(named.place, c),
+                       named.place});
   }
   return parts;
 }
@@ -65,7 +69,7 @@ std::string vectorsOf(ValueType component) {
 }
 
 /// The row of a grid of vectors. The rows of its components follow.
-std::vector<std::string> rowOfVector(const Listing& listing, const NamedGrid& named) {
+std::vector<std::string> rowOfVector(const Listing& listing, const ListedGrid& named) {
   const StoredVector& vector = listing.file.vectors[named.grid.index];
   std::uint64_t voxels = 0, bytes = 0, ellipsoids = 0;
   for (std::size_t g = vector.first; g < vector.first + kComponents; ++g) {
@@ -86,7 +90,7 @@ std::vector<std::string> rowOfVector(const Listing& listing, const NamedGrid& na
           "-"};
 }
 
-std::vector<std::string> rowOfStored(const Listing& listing, const NamedGrid& named) {
+std::vector<std::string> rowOfStored(const Listing& listing, const ListedGrid& named) {
   const StoredGrid& grid = listing.file.grids[named.grid.index];
   const std::uint64_t bytes = cli::storedBytes(listing.summary, named.grid.index);
   const std::uint64_t ellipsoids = listing.ellipsoids[named.grid.index];
@@ -109,7 +113,7 @@ GridSummary summaryOf(const Options& options, const CarriedGrid& grid) try {
   throw BadInput(options.input.string() + ": " + error.what());
 }
 
-std::vector<std::string> rowOfCarried(const Listing& listing, const NamedGrid& named) {
+std::vector<std::string> rowOfCarried(const Listing& listing, const ListedGrid& named) {
   const GridSummary grid = summaryOf(listing.options, listing.file.carried[named.grid.index]);
   const std::size_t number = listing.numberOf(named.grid);
   return {named.name,
@@ -127,19 +131,20 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const NamedGrid& n
 void printGrids(const Listing& listing) {
   cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "fitted for",
                     "kernel, kappa", "active by", "bytes", "bytes each"});
-  for (const NamedGrid& named : listing.grids) {
-    if (named.grid.isVector) table.add(rowOfVector(listing, named));
-    for (const NamedGrid& part : withComponents(listing.file, {named}))
-      table.add(part.grid.isCarried ? rowOfCarried(listing, part) : rowOfStored(listing, part));
+  std::size_t place = listing.grids.size();
+  for (const ListedGrid& part : listing.parts) {
+    const ListedGrid& grid = listing.grids[part.place];
+    if (grid.grid.isVector && part.place != place) table.add(rowOfVector(listing, grid));
+    place = part.place;
+    table.add(part.grid.isCarried ? rowOfCarried(listing, part) : rowOfStored(listing, part));
   }
   table.print(std::cout);
 }
 
 /// The name of a section's grid; "-" if it belongs to the file.
 std::string gridOf(const Listing& listing, const SectionSummary& section) {
-  for (const auto& [grid, name] : listing.parts)
-    if (listing.numberOf(grid) == section.grid) return name;
-  return "-";
+  const auto name = listing.names.find(section.grid);
+  return name == listing.names.end() ? "-" : name->second;
 }
 
 void printSections(const Listing& listing) {
@@ -160,7 +165,7 @@ void addStream(cli::Table& table, const std::string& grid, const char* stream, s
 /// Prints the bytes of the quantised ellipsoids, by stream.
 void printStreams(const Listing& listing) {
   cli::Table table({"grid", "stream", "bytes", "bytes each"});
-  for (const auto& [place, name] : listing.parts) {
+  for (const auto& [place, name, number] : listing.parts) {
     if (place.isCarried) continue;
     const StoredGrid& grid = listing.file.grids[place.index];
     if (grid.quantised.empty()) continue;
@@ -177,7 +182,7 @@ void printStreams(const Listing& listing) {
 /// Prints the error and the bytes of the first layers.
 void printLayers(const Listing& listing) {
   cli::Table table({"grid", "layers", "ellipsoids", "bytes", "PSNR box", "max error"});
-  for (const auto& [place, name] : listing.parts) {
+  for (const auto& [place, name, number] : listing.parts) {
     if (place.isCarried) continue;
     const auto& errors = listing.file.grids[place.index].layerErrors;
     const auto sizes = layerSizes(listing.file.grids[place.index]);
@@ -197,9 +202,8 @@ void printLayers(const Listing& listing) {
 /// The name of the grid whose voxels those of a grid refer to; empty if there is none.
 std::string referenceOf(const Listing& listing, const StoredGrid& grid) {
   if (!grid.reference || !grid.reference->grid) return "";
-  const GridOfFile wanted{false, *grid.reference->grid};
-  const auto at = std::ranges::find(listing.parts, wanted, &NamedGrid::grid);
-  return at == listing.parts.end() ? "" : at->name;
+  const auto name = listing.names.find(*grid.reference->grid);
+  return name == listing.names.end() ? "" : name->second;
 }
 
 void printStoredDetails(const Listing& listing, const std::string& name, const StoredGrid& grid) {
@@ -222,7 +226,7 @@ void printCarriedDetails(const Options& options, const std::string& name, const 
 
 void printDetails(const Listing& listing) {
   cli::printMetadata("file metadata", listing.file.metadata, std::cout);
-  for (const auto& [grid, name] : listing.parts)
+  for (const auto& [grid, name, number] : listing.parts)
     if (grid.isCarried)
       printCarriedDetails(listing.options, name, listing.file.carried[grid.index]);
     else
@@ -239,6 +243,8 @@ PartOfFile readForList(const Options& options) {
 }  // namespace
 
 void list(const Options& options) {
+  if (const auto pattern = cli::FramePattern::ofInput(options.input.string()))
+    return listFrames(options, *pattern);
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
   if (holdsSequence(options.input)) return listSequence(options);
@@ -248,11 +254,14 @@ void list(const Options& options) {
                   std::move(part.ellipsoidsInFile),
                   inspectEsvr(options.input),
                   {}};
-  listing.grids = namedGrids(listing.file);
+  listing.grids = listedGrids(listing.file);
   listing.parts = withComponents(listing.file, listing.grids);
+  for (const ListedGrid& listed : listing.parts)
+    listing.names[listing.numberOf(listed.grid)] = listed.name;
   std::cout << cli::printable(options.input.string()) << ": .esvr format "
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "
-            << listing.summary.fileBytes << " bytes\n\n";
+            << listing.summary.fileBytes << " bytes" << (listing.grids.empty() ? ", no grid" : "")
+            << "\n\n";
   printGrids(listing);
   std::cout << '\n';
   printSections(listing);

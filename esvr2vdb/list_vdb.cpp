@@ -33,7 +33,7 @@ void printDetails(const VdbSummary& file) {
 void listVdb(const Options& options) {
   const VdbSummary file = inspectVdb(options.input);
   std::cout << cli::printable(options.input.string()) << ": " << file.format << ", "
-            << file.fileBytes << " bytes\n\n";
+            << file.fileBytes << " bytes" << (file.grids.empty() ? ", no grid" : "") << "\n\n";
   printGrids(file);
   if (options.verbosity != cli::Verbosity::kVerbose) return;
   std::cout << '\n';

@@ -25,9 +25,11 @@ cli::ProgramText programText() {
       .usage =
           "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
           "  esvr2vdb IN.####.esvr|IN.esvr OUT.####.vdb [--frames 1-100] ...\n"
-          "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb\n"
-          "  esvr2vdb --check IN.esvr",
+          "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb|IN.####.vdb\n"
+          "  esvr2vdb --check IN.esvr|IN.####.esvr",
       .notes =
+          "IN and REF.vdb may be - for standard input, or a pipe.\n"
+          "\n"
           "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of the "
           "file and of its grids, and it gets no grids of vectors and no carried grids. --lod, "
           "--max-ellipsoids and --bbox do not write carried grids either, because they cannot be "
@@ -43,7 +45,10 @@ cli::ProgramText programText() {
           "sections names the grid with which a section is shared.\n"
           "\n"
           "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the "
-          "frame. --list prints its frames and groups, and --check names each frame that is lost.\n"
+          "frame in the name of the file. --list prints its frames and groups, and --check names "
+          "each frame that is lost. "
+          "With a pattern, --list prints a row for the file of each frame, and --check checks each "
+          "of them.\n"
           "\n"
           "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be "
           "used, 5 not enough memory (--max-memory). A sequence has the code of its first frame "
@@ -62,6 +67,7 @@ cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN.esvr");
   line.optionalArgument("output", "OUT.vdb");
+  line.volumeInputs({"input", "reference"});
   // clang-format off
   line.options().add_options()
     ("list", bool_switch(),
@@ -145,7 +151,8 @@ void readConversion(const Arguments& a, Options& options) {
   if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
   if (options.box && !options.reference) throw UsageError("--box says nothing without --reference");
   options.sequence = cli::readSequence(a, {.input = true});
-  if (options.sequence && options.reference && !cli::FramePattern::in(options.reference->string()))
+  if (options.sequence && options.reference &&
+      !cli::FramePattern::ofInput(options.reference->string()))
     throw UsageError("--reference needs a pattern for the number of a frame, because '" +
                      options.input.string() + "' is a sequence");
 }
@@ -163,6 +170,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   Options options;
   options.job = jobOf(*arguments);
   options.input = arguments->get<std::string>("input");
+  options.inputs = arguments->inputs;
   options.threads = arguments->threads;
   options.verbosity = arguments->verbosity;
   options.memory = cli::hostMemoryOf(*arguments);

@@ -23,6 +23,7 @@ enum class Job { kConvert, kList, kCheck };
 struct Options {
   Job job = Job::kConvert;
   std::filesystem::path input, output;
+  cli::InputFiles inputs;
   /// The frames, if the input and the output are patterns. The reference is a pattern, too.
   std::optional<cli::Sequence> sequence;
   std::vector<std::string> grids;  ///< names of the grids; empty: all

@@ -1,10 +1,10 @@
 #include "render/camera_file.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "cli/input_files.h"
 #include "esvr/error.h"
 
 namespace esvr::render {
@@ -47,12 +47,6 @@ void set(const std::string& key, const json& value, CameraWish& wish) {
     throw BadInput("is none of eye, center, up, fov, height, orthographic");
 }
 
-json parsed(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw BadInput("cannot read " + path.string());
-  return json::parse(file, nullptr, false);
-}
-
 }  // namespace
 
 CameraWish cameraWish(const json& content) {
@@ -68,7 +62,7 @@ CameraWish cameraWish(const json& content) {
 }
 
 CameraWish readCamera(const std::filesystem::path& path) {
-  const json content = parsed(path);
+  const json content = json::parse(cli::readText(path), nullptr, false);
   try {
     return cameraWish(content);
   } catch (const BadInput& error) {

@@ -1,8 +1,12 @@
 #include "render/option_groups.h"
 
-#include "cli/frame_pattern.h"
+#include <algorithm>
+#include <iterator>
+
+#include "cli/frame_messages.h"
 #include "cli/number_list.h"
 #include "cli/sequence.h"
+#include "esvr/error.h"
 #include "render/camera_file.h"
 #include "render/vector_option.h"
 #include "report/video_file.h"
@@ -61,24 +65,47 @@ void checkVideoOptions(const Arguments& a, const Options& options) {
   if (a.get<int>("bits") != 8) throw UsageError("a video has 8 bits per channel; leave --bits out");
 }
 
-/// Reads the frames of an input that holds a sequence.
-void readSequence(const Arguments& a, std::vector<cli::FrameNumber> stored, Options& options) {
+/// The frames of a pattern that are drawn. \throws BadInput  one of them is missing
+void readPattern(const Arguments& a, const cli::FramePattern& pattern, Options& options) {
+  const cli::FrameListing listing = cli::framesOnDisk(pattern);
+  const auto range = a.find<std::string>("frames");
+  options.pattern = pattern;
+  options.frames = range ? cli::parseFrames("frames", *range) : listing.frames;
+  options.frameHint = listing.hint(range ? &*options.frames : nullptr);
+  std::vector<cli::FrameNumber> missing;
+  std::ranges::copy_if(*options.frames, std::back_inserter(missing), [&](cli::FrameNumber frame) {
+    return !std::ranges::binary_search(listing.frames, frame);
+  });
+  std::ranges::sort(missing);
+  if (!missing.empty())
+    throw BadInput(pattern.text() + ": " +
+                   cli::sentenceOn(missing, options.frames->size(), "are missing") +
+                   (options.frameHint.empty() ? "" : "; " + options.frameHint));
+}
+
+/// Checks the options of an input that is a sequence.
+void checkSequenceOptions(const Arguments& a, const Options& options) {
   for (const char* option : {"turntable", "ref", "bench", "report"})
     if (a.has(option) && !a.values[option].defaulted())
       throw UsageError("--" + std::string(option) + " cannot be combined with a sequence");
-  const auto range = a.find<std::string>("frames");
-  options.frames = range ? cli::parseFrames("frames", *range) : std::move(stored);
   for (const auto& output : {options.output.string(), a.find<std::string>("depth").value_or("")})
     if (!output.empty() && !report::isVideo(output) && !cli::FramePattern::in(output))
       throw UsageError("'" + output +
-                       "' needs a pattern such as #### for the number of a frame, because '" +
-                       options.input.string() + "' holds a sequence");
+                       "' needs a pattern such as #### for the number of a frame in the name of "
+                       "the file, because '" +
+                       options.input.string() + "' is a sequence");
 }
 
 void readFrames(const Arguments& a, Options& options) {
-  if (auto stored = cli::framesInFile(options.input))
-    return readSequence(a, std::move(*stored), options);
   const auto text = a.find<std::string>("frames");
+  if (auto stored = cli::framesInFile(options.input)) {
+    options.frames = text ? cli::parseFrames("frames", *text) : std::move(*stored);
+    return checkSequenceOptions(a, options);
+  }
+  if (const auto pattern = cli::FramePattern::ofInput(options.input.string())) {
+    readPattern(a, *pattern, options);
+    return checkSequenceOptions(a, options);
+  }
   if (!text) return;
   if (options.turntable == 0) throw UsageError("--frames needs --turntable or a sequence");
   const auto dash = text->find('-');

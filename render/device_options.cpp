@@ -1,5 +1,6 @@
 #include "render/option_groups.h"
 
+#include "cli/byte_size.h"
 #include "cli/choice.h"
 #include "cli/device_option.h"
 
@@ -8,8 +9,6 @@ namespace {
 
 using cli::Arguments;
 using cli::po::value;
-
-constexpr double kMinVram = 0.001, kMaxVram = 1e4;  // GB
 
 std::optional<NanoValues> valuesOf(const Arguments& a) {
   const auto word = a.find<std::string>("values");
@@ -28,10 +27,8 @@ RendererLimits limitsOf(const Arguments& a) {
     cli::requireRange("depth-parts", *parts, 1, RendererLimits::kMaxDepthParts);
     limits.depthParts = *parts;
   }
-  if (const auto gigabytes = a.find<double>("max-vram")) {
-    cli::requireRange("max-vram", *gigabytes, kMinVram, kMaxVram);
-    limits.maxBytes = std::uint64_t(*gigabytes * 1e9);
-  }
+  if (const auto memory = a.find<std::string>("max-vram"))
+    limits.maxBytes = cli::parseDeviceMemory("max-vram", *memory);
   return limits;
 }
 
@@ -41,8 +38,9 @@ void addDeviceOptions(cli::po::options_description& options) {
   cli::addDevice(options);
   // clang-format off
   options.add_options()
-    ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use; if it is small, voxels are decoded again when they are needed again, and "
+    ("max-vram", value<std::string>()->value_name("BYTES"),
+     "GPU memory to use, for example 4GB or 64MB; a number below 1000000 without a unit is one of GB; "
+     "if it is small, voxels are decoded again when they are needed again, and "
      "large pictures are drawn in bands (default: all free memory)")
     ("depth-parts", value<int>()->value_name("N"),
      "with --between sum: number of parts, 1 to 16, into which a GPU divides the depth of the scene "

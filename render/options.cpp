@@ -15,6 +15,8 @@ cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN");
   line.optionalArgument("output", "OUT.png");
+  line.volumeInputs({"input", "ref"});
+  line.textInputs({"camera", "tf"});
   // clang-format off
   line.options().add_options()
     ("grid,g", value<std::string>()->value_name("NAME"),
@@ -39,6 +41,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   const cli::Arguments& a = *arguments;
   Options options;
   options.input = a.get<std::string>("input");
+  options.inputs = a.inputs;
   options.output = a.find<std::string>("output").value_or("");
   options.grid = a.find<std::string>("grid");
   readCameraOptions(a, options);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/frame_range.h"
+#include "cli/frame_pattern.h"
 #include "cli/host_memory.h"
 #include "cli/log.h"
 #include "esvr/renderer.h"
@@ -44,6 +44,7 @@ struct FurtherGrid {
 
 struct Options {
   std::filesystem::path input;
+  cli::InputFiles inputs;
   std::filesystem::path output;     ///< empty: no picture is written
   std::optional<std::string> grid;  ///< default: the first that can be drawn
   Look look;
@@ -64,10 +65,12 @@ struct Options {
   int turntable = 0;             ///< number of pictures of a full turn; 0: one picture
   int firstFrame = 0;            ///< first picture of the turn to draw
   std::optional<int> lastFrame;  ///< last picture of the turn to draw; default: the turn's last
-  /// The frames to draw, if the input holds a sequence.
+  /// The frames to draw, if the input holds a sequence or is a pattern.
   std::optional<std::vector<cli::FrameNumber>> frames;
-  double fps = 30.0;            ///< pictures per second of a video
-  std::filesystem::path depth;  ///< file of distances; empty: none
+  std::optional<cli::FramePattern> pattern;  ///< the frames are files; nothing: the input has all
+  std::string frameHint;                     ///< names that look like frames and are none
+  double fps = 30.0;                         ///< pictures per second of a video
+  std::filesystem::path depth;               ///< file of distances; empty: none
   std::filesystem::path saveTransfer;
   std::string device = "auto";
   RendererLimits limits;

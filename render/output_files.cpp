@@ -45,27 +45,31 @@ void createFolder(const fs::path& folder) {
 }
 
 void checkPicture(const Options& options, const fs::path& file) {
-  cli::requireDistinct({options.input, file});
   cli::checkOutput(file, {".png", ".exr"}, options.overwrite);
   if (options.reference.empty()) return;
-  cli::requireDistinct({options.reference, file, errorName(file)});
   cli::checkOutput(errorName(file), {".png", ".exr"}, options.overwrite);
 }
 
 void checkPictureFiles(const Options& options, const PictureFiles& files) {
   if (!files.picture.empty()) checkPicture(options, files.picture);
-  if (!files.depth.empty()) {
-    cli::requireDistinct({options.input, files.depth});
-    cli::checkOutput(files.depth, {".exr"}, options.overwrite);
+  if (!files.depth.empty()) cli::checkOutput(files.depth, {".exr"}, options.overwrite);
+  if (!files.sheet.empty()) cli::checkOutput(files.sheet, {".png"}, options.overwrite);
+}
+
+/// All files that the run writes.
+std::vector<fs::path> allOutputs(const Options& options) {
+  std::vector<fs::path> outputs{options.saveTransfer, options.report};
+  if (report::isVideo(options.output)) outputs.push_back(options.output);
+  if (options.bench) return outputs;
+  for (const PictureFiles& files : pictureFiles(options)) {
+    outputs.insert(outputs.end(), {files.picture, files.depth, files.sheet});
+    if (!options.reference.empty() && !files.picture.empty())
+      outputs.push_back(errorName(files.picture));
   }
-  if (!files.sheet.empty()) {
-    cli::requireDistinct({options.input, options.reference, files.sheet});
-    cli::checkOutput(files.sheet, {".png"}, options.overwrite);
-  }
+  return outputs;
 }
 
 void checkVideo(const Options& options) {
-  cli::requireDistinct({options.input, options.output});
   cli::checkOutput(options.output, {".mp4", ".webm"}, options.overwrite);
   report::checkVideoSize(options.resolution.width, options.resolution.height);
   (void)report::findFfmpeg();
@@ -118,6 +122,7 @@ std::vector<PictureFiles> pictureFiles(const Options& options) {
 
 void checkFiles(const Options& options) {
   if (options.turntable != 0 && endsInSlash(options.output)) createFolder(options.output);
+  cli::requireSeparate(options.inputs.paths, allOutputs(options));
   if (report::isVideo(options.output)) checkVideo(options);
   if (!options.bench)
     for (const PictureFiles& files : pictureFiles(options)) checkPictureFiles(options, files);

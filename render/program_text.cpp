@@ -15,7 +15,8 @@ std::string listOf(const std::string& title, const std::vector<std::string>& nam
 }
 
 std::string notes() {
-  return "IN may be an .esvr, a .vdb or an .nvdb file. All are drawn with the same camera, "
+  return "IN may be an .esvr, a .vdb or an .nvdb file, - for standard input, or a pipe. All are "
+         "drawn with the same camera, "
          "samples, transfer function and compositing. Voxels are interpolated trilinearly. The "
          "voxels of an .esvr file are decoded when a ray needs them, and kept for the next "
          "picture. All are decoded before the first picture if the file stores voxels, a residual "
@@ -42,8 +43,9 @@ std::string notes() {
          "OUT/frame.0000.png and so on. If it ends in .mp4 or .webm, the program ffmpeg, which "
          "must be in PATH, encodes a video. A video shows the background; the default is black.\n"
          "\n"
-         "If IN.esvr holds a sequence, each frame becomes a picture with the number of the frame "
-         "in place of the pattern in OUT, or a picture of the video. All have one camera and one "
+         "If IN.esvr holds a sequence, or IN is a pattern such as smoke.####.vdb, each frame "
+         "becomes a picture with the number of the frame in place of the pattern in OUT, or a "
+         "picture of the video. All have one camera and one "
          "range of values, which are those of all frames together.\n"
          "\n"
          "--legend shows the color of each value and, in a second column in front of a "
@@ -84,7 +86,7 @@ cli::ProgramText programText() {
       .usage =
           "  esvr-render IN.esvr OUT.png|OUT.exr [OPTION]...\n"
           "  esvr-render IN.vdb OUT.png|OUT.exr [OPTION]...\n"
-          "  esvr-render IN.esvr OUT.####.png|OUT.mp4 [--frames 1-100] [OPTION]...\n"
+          "  esvr-render IN.esvr|IN.####.vdb OUT.####.png|OUT.mp4 [--frames 1-100] [OPTION]...\n"
           "  esvr-render IN OUT.mp4|OUT.webm|FOLDER/ --turntable N [OPTION]...\n"
           "  esvr-render IN.esvr --bench [--ref IN.vdb] [--report FILE.json] [OPTION]...",
       .notes = notes(),

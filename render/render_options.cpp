@@ -52,11 +52,17 @@ Box boxOf(const std::vector<Scene>& scenes) {
   return box;
 }
 
+/// The shape of the voxels; that of a cube without an affine transform.
+VoxelShape voxelOf(const std::vector<Scene>& scenes) {
+  return voxelShape(scenes.front().transform.affine).value_or(VoxelShape{});
+}
+
 /// The camera; if it is fitted, the volume lies beside the color bar.
 Camera cameraOf(const Options& options, const std::vector<Scene>& scenes) {
   const Resolution r = options.resolution;
   CameraWish wish = options.camera;
   wish.framing = framingOf(options);
+  wish.voxel = voxelOf(scenes);
   if (const auto bar = barOf(options, scenes.front()))
     wish.freeRight = report::colorBarShare(*bar, r.width, r.height);
   return fitCamera(boxOf(scenes), wish, r);
@@ -80,7 +86,9 @@ std::optional<report::ColorBar> barOf(const Options& options, const Scene& scene
 }
 
 Vec3 pivotOf(const Options& options, const std::vector<Scene>& scenes) {
-  return esvr::pivotOf(boxOf(scenes), options.camera);
+  CameraWish wish = options.camera;
+  wish.voxel = voxelOf(scenes);
+  return esvr::pivotOf(boxOf(scenes), wish);
 }
 
 RenderOptions renderOptions(const Options& options, const std::vector<Scene>& scenes) {

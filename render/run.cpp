@@ -16,6 +16,7 @@
 #include "esvr/image_metrics.h"
 #include "esvr/memory_limit.h"
 #include "esvr/sequence_file.h"
+#include "esvr/vdb_io.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
 #include "render/output_files.h"
@@ -63,11 +64,15 @@ SceneFile sceneFile(const Options& options, const fs::path& path) {
 }
 
 /// The drawing of --ref. If the input is a VDB file, --values applies to the input alone.
-std::unique_ptr<Drawing> referenceOf(const Options& options, const DrawSettings& settings) {
+/// \param drawn  the grid of the input, which is also drawn of the reference if it has a grid of this name
+std::unique_ptr<Drawing> referenceOf(const Options& options, const std::string& drawn,
+                                     const DrawSettings& settings) {
   if (options.reference.empty()) return nullptr;
   DrawSettings own = settings;
   if (options.input.extension() != ".esvr") own.values.reset();
-  return std::make_unique<Drawing>(readScenes(sceneFile(options, options.reference)), own);
+  SceneFile file = sceneFile(options, options.reference);
+  if (!file.grid) file.preferred = drawn;
+  return std::make_unique<Drawing>(readScenes(file), own);
 }
 
 std::string summary(const fs::path& file, const std::vector<Scene>& scenes, Resolution r,
@@ -222,6 +227,16 @@ void writeReport(const Options& options, const nlohmann::ordered_json& report) {
   if (!options.report.empty()) cli::writeJson({options.report, options.overwrite}, report);
 }
 
+/// Warns that a transform is not applied.
+void reportTransform(const Options& options, const std::vector<Scene>& scenes) {
+  if (voxelShape(scenes.front().transform.affine)) return;
+  cli::Log(kProgram, options.verbosity)
+      .warning(
+          options.input.string() + ", " + scenes.front().grid +
+          ": its transform is a frustum or has no inverse, and is not applied; voxels are drawn "
+          "as cubes");
+}
+
 void drawFrames(const Options& options, RenderOptions r, Drawing& drawing, Frames& frames) {
   const Vec3 pivot = pivotOf(options, drawing.scenes);  // of a turntable
   const Camera first = r.camera;
@@ -238,13 +253,53 @@ void saveTransfer(const Options& options, const TransferFunction& transfer) {
   cli::writeBytes(options.saveTransfer, std::as_bytes(std::span(text)), options.overwrite);
 }
 
+/// The frames of the input: in one file, or a file each.
+class InputFrames {
+ public:
+  explicit InputFrames(const Options& options)
+      : options_(options), file_(sceneFile(options, options.input)) {
+    if (options.pattern) return;
+    ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
+    limits.carriedBytes = false;
+    reader_.emplace(options.input, limits);
+  }
+
+  /// The grids of a frame; nothing if it has nothing active to draw.
+  std::optional<std::vector<Scene>> scenes(cli::FrameNumber frame) {
+    if (reader_) return scenesOf(reader_->read(frame), file_);
+    return place(frame) ? readFrame(file_) : std::nullopt;
+  }
+  /// The same without their content.
+  std::optional<std::vector<Scene>> outlines(cli::FrameNumber frame) {
+    if (reader_) return outlinesOf(reader_->read(frame), file_);
+    return place(frame) ? readFrameOutlines(file_) : std::nullopt;
+  }
+
+ private:
+  /// Sets the file of a frame. Unless the options name a grid, all frames of .vdb files draw the
+  /// grid of one name, which is the first that can be drawn in any of them.
+  /// \return false if the frame does not have this grid
+  bool place(cli::FrameNumber frame) {
+    file_.path = options_.pattern->toRead(frame);
+    if (options_.grid || file_.path.extension() == ".esvr") return true;
+    if (!file_.grid) file_.grid = firstDrawable(file_.path);
+    if (!file_.grid) return false;
+    return std::ranges::any_of(inspectVdb(file_.path).grids, [&](const GridSummary& grid) {
+      return grid.uniqueName == *file_.grid;
+    });
+  }
+
+  const Options& options_;
+  SceneFile file_;
+  std::optional<SequenceReader> reader_;
+};
+
 /// Scenes that enclose those of all frames, so that camera and transfer functions do not change from
 /// frame to frame.
-std::vector<Scene> scenesOfAll(const Options& options, const SceneFile& file,
-                               SequenceReader& reader) {
+std::vector<Scene> scenesOfAll(const Options& options, InputFrames& input) {
   std::optional<std::vector<Scene>> all;
   for (const cli::FrameNumber frame : *options.frames) {
-    auto scenes = outlinesOf(reader.read(frame), file);
+    auto scenes = input.outlines(frame);
     if (scenes && all) enclose(*scenes, *all);
     if (!all) all = std::move(scenes);
   }
@@ -253,18 +308,19 @@ std::vector<Scene> scenesOfAll(const Options& options, const SceneFile& file,
 }
 
 void drawSequence(const Options& options, const DrawSettings& settings, const CancelToken& cancel) {
-  const SceneFile file = sceneFile(options, options.input);
-  ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
-  limits.carriedBytes = false;
-  SequenceReader reader(options.input, limits);
-  const auto all = scenesOfAll(options, file, reader);
+  if (!options.frameHint.empty())
+    cli::Log(kProgram, options.verbosity)
+        .warning(options.input.string() + ": " + options.frameHint);
+  InputFrames input(options);
+  const auto all = scenesOfAll(options, input);
+  reportTransform(options, all);
   RenderOptions r = renderOptions(options, all);
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
   Frames frames(options, all, nullptr, cancel);
   for (const cli::FrameNumber frame : *options.frames) {
     const PictureFiles files = filesOfFrame(options, frame);
-    auto scenes = scenesOf(reader.read(frame), file);
+    auto scenes = input.scenes(frame);
     if (!scenes) {
       frames.drawNothing(r, files);
       continue;
@@ -285,9 +341,10 @@ void run(const Options& options) {
                               options.shading.has_value(), options.memory};
   if (options.frames) return drawSequence(options, settings, interrupts.token());
   auto scenes = readScenes(sceneFile(options, options.input));
+  reportTransform(options, scenes);
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);
-  const auto reference = referenceOf(options, settings);
+  const auto reference = referenceOf(options, drawing.scenes.front().grid, settings);
   r.cancel = &interrupts.token();
   saveTransfer(options, r.transfer);
   auto report = reportHead(options, settings.device);

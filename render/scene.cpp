@@ -19,14 +19,27 @@ std::size_t firstOf(const EsvrFile& file) {
   return place < file.grids.size() ? place : 0;
 }
 
-std::size_t placeOf(const EsvrFile& file, const std::filesystem::path& path,
-                    const std::optional<std::string>& grid) {
+/// Whether the preferred grid of a file is to be drawn. \throws BadInput  its name is ambiguous
+bool takesPreferred(const SceneFile& from, const GridNames& names) {
+  if (!from.preferred || from.grid) return false;
+  if (names.isAmbiguous(*from.preferred)) (void)names.find(*from.preferred, from.path);
+  return names.lookUp(*from.preferred).has_value();
+}
+
+/// The index of the grid in EsvrFile::grids that is drawn.
+std::size_t placeOf(const EsvrFile& file, const SceneFile& from) {
   if (file.grids.empty())
-    throw BadInput(path.string() + ": no grid that can be drawn; carried grids have no voxels");
-  if (!grid) return firstOf(file);
-  std::vector<std::string> names;
-  for (const auto& g : file.grids) names.push_back(g.descriptor.name);
-  return findGrid(names, *grid, path);
+    throw BadInput(from.path.string() +
+                   (file.carried.empty()
+                        ? ": the file has no grid, so there is nothing to draw"
+                        : ": no grid that can be drawn; carried grids have no voxels"));
+  if (from.grid) return findStored(file, *from.grid, from.path);
+  const GridNames names(namesInOrder(file));
+  if (!takesPreferred(from, names)) return firstOf(file);
+  const NamedGrid preferred = names.find(*from.preferred);
+  const GridOfFile grid = gridsInOrder(file)[preferred.place];
+  const bool isDrawable = !grid.isCarried && grid.isVector == preferred.component.has_value();
+  return isDrawable ? findStored(file, *from.preferred, from.path) : firstOf(file);
 }
 
 /// The text of the grid's metadata "unit" or "units"; empty if it has neither.
@@ -43,10 +56,10 @@ void requireOneTransform(const std::vector<Scene>& scenes, const std::filesystem
                      " have different transforms and cannot be drawn in one picture");
 }
 
-/// A grid without its content.
-Scene outlineOf(const StoredGrid& grid) {
+/// A grid without its content. \param name  by which users find it
+Scene propertiesOf(const StoredGrid& grid, const std::string& name) {
   Scene scene;
-  scene.grid = grid.descriptor.name;
+  scene.grid = name;
   scene.unit = unitOf(grid.descriptor);
   scene.transform = grid.descriptor.transform;
   scene.box = grid.activeBox;
@@ -58,8 +71,8 @@ Scene outlineOf(const StoredGrid& grid) {
 
 /// A grid with its content. If it stores its voxels, they are drawn instead of the ellipsoids,
 /// because they are exact.
-Scene complete(StoredGrid grid, const cli::HostMemory& memory) {
-  Scene scene = outlineOf(grid);
+Scene complete(StoredGrid grid, const std::string& name, const cli::HostMemory& memory) {
+  Scene scene = propertiesOf(grid, name);
   if (grid.voxels)
     scene.content =
         VolumeGrid{grid.descriptor,
@@ -71,8 +84,8 @@ Scene complete(StoredGrid grid, const cli::HostMemory& memory) {
 
 /// The places of the grid and of the further grids of a file.
 std::vector<std::size_t> placesOf(const EsvrFile& file, const SceneFile& from) {
-  std::vector<std::size_t> places{placeOf(file, from.path, from.grid)};
-  for (const std::string& name : from.with) places.push_back(placeOf(file, from.path, name));
+  std::vector<std::size_t> places{placeOf(file, from)};
+  for (const std::string& name : from.with) places.push_back(findStored(file, name, from.path));
   return places;
 }
 
@@ -82,11 +95,12 @@ std::vector<Scene> encoded(const SceneFile& from) {
   limits.carriedBytes = false;
   EsvrFile file = readEsvr(from.path, limits);
   const auto places = placesOf(file, from);
+  const auto names = namesOfStored(file);
   std::vector<Scene> scenes;
   for (auto place = places.begin(); place != places.end(); ++place) {
     StoredGrid& grid = file.grids[*place];
     const bool isLast = std::find(place + 1, places.end(), *place) == places.end();
-    scenes.push_back(complete(isLast ? std::move(grid) : grid, from.memory));
+    scenes.push_back(complete(isLast ? std::move(grid) : grid, names[*place], from.memory));
   }
   return scenes;
 }
@@ -98,42 +112,136 @@ std::optional<std::vector<Scene>> scenesBy(const EsvrFile& frame, const SceneFil
                                            Make&& make) {
   if (frame.grids.empty()) return std::nullopt;
   std::vector<Scene> scenes;
-  for (const std::size_t place : placesOf(frame, file)) scenes.push_back(make(frame.grids[place]));
+  const auto names = namesOfStored(frame);
+  for (const std::size_t place : placesOf(frame, file))
+    scenes.push_back(make(frame.grids[place], names[place]));
   requireOneTransform(scenes, file.path);
   return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
 }
 
-std::string firstDrawable(const std::filesystem::path& path) {
-  for (const auto& grid : inspectVdb(path).grids)
-    if (grid.skipReason.empty() && grid.activeVoxels > 0) return grid.uniqueName;
-  throw BadInput(path.string() + ": no grid that can be drawn");
+/// Whether a grid of ellipsoids has so much empty space between its voxels that the table of its blocks
+/// of 64^3 voxels, by which rays find bricks (render/brick_table.h), would be too large. Such a grid is
+/// decoded at once, and its bricks are found by a search.
+bool liesFarApart(const Scene& scene) {
+  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
+  constexpr double kBlockSide = 64.0;
+  const auto* const field = std::get_if<Field>(&scene.content);
+  if (field == nullptr || !scene.encoded || fittedBetween(*field) == Between::kSum) return false;
+  const auto blocks = [](std::int32_t low, std::int32_t high) {
+    return (double(high) - double(low)) / kBlockSide + 2.0;
+  };
+  const Box& box = scene.box;
+  return blocks(box.min.x, box.max.x) * blocks(box.min.y, box.max.y) *
+             blocks(box.min.z, box.max.z) >
+         kMostBlocks;
 }
 
-Scene voxels(const SceneFile& from, const std::string& name) {
-  VolumeGrid grid =
-      readGrid(from.path, name, {.maxBytes = from.memory.maxBytes, .memory = from.memory.voxels});
-  Scene scene;
-  scene.grid = grid.descriptor.name;
-  scene.unit = unitOf(grid.descriptor);
-  scene.transform = grid.descriptor.transform;
-  scene.box = activeBox(grid.volume);
-  scene.data = activeRange(grid.volume);
-  scene.background = grid.volume.background;
-  scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
-  scene.content = std::move(grid);
-  return scene;
-}
+/// The grids of a .vdb or .nvdb file.
+class GridsOfVdb {
+ public:
+  explicit GridsOfVdb(const SceneFile& from)
+      : from_(from), grids_(inspectVdb(from.path).grids), names_(namesOf(grids_)) {}
 
-std::vector<Scene> voxels(const SceneFile& from) {
-  std::vector<Scene> scenes{voxels(from, from.grid ? *from.grid : firstDrawable(from.path))};
-  for (const std::string& name : from.with) scenes.push_back(voxels(from, name));
-  return scenes;
-}
+  [[nodiscard]] std::vector<Scene> scenes() const {
+    std::vector<Scene> scenes{scene(from_.grid ? named(*from_.grid) : requiredDrawable())};
+    for (const std::string& name : from_.with) scenes.push_back(scene(named(name)));
+    return scenes;
+  }
+
+  /// The scenes of a frame of a sequence, whose grids may be empty.
+  /// \return nothing if there is nothing active to draw
+  [[nodiscard]] std::optional<std::vector<Scene>> frame() const {
+    if (grids_.empty()) return std::nullopt;
+    const auto first = from_.grid ? std::optional(named(*from_.grid)) : firstDrawable();
+    if (!first) return std::nullopt;
+    std::vector<Scene> scenes{scene(*first, true)};
+    for (const std::string& name : from_.with) scenes.push_back(scene(named(name), true));
+    requireOneTransform(scenes, from_.path);
+    return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
+  }
+
+  /// The name of the grid that is drawn where none is named.
+  [[nodiscard]] std::optional<std::string> firstDrawableName() const {
+    const auto first = firstDrawable();
+    return first ? std::optional(nameOf(*first)) : std::nullopt;
+  }
+
+ private:
+  static GridNames namesOf(const std::vector<GridSummary>& grids) {
+    std::vector<std::string> names;
+    for (const GridSummary& grid : grids) names.push_back(grid.name);
+    return GridNames(std::move(names));
+  }
+
+  /// The grid or the component that a user names.
+  [[nodiscard]] NamedGrid named(const std::string& name) const {
+    const NamedGrid grid = names_.find(name, from_.path);
+    if (!grid.component && grids_[grid.place].isVector)
+      throw BadInput(from_.path.string() + ": grid \"" + names_.unique(grid.place) +
+                     "\" has vectors; name a component, such as \"" +
+                     names_.ofComponent(grid.place, 0) + '"');
+    return grid;
+  }
+
+  [[nodiscard]] bool isDrawable(const NamedGrid& grid) const {
+    const GridSummary& summary = grids_[grid.place];
+    if (grid.component) return summary.isVector;
+    return summary.skipReason.empty() && summary.activeVoxels > 0;
+  }
+
+  /// The preferred grid, or the first one of numbers, or else the first component of vectors.
+  [[nodiscard]] std::optional<NamedGrid> firstDrawable() const {
+    if (takesPreferred(from_, names_))
+      if (const NamedGrid preferred = names_.find(*from_.preferred); isDrawable(preferred))
+        return preferred;
+    for (std::size_t g = 0; g < grids_.size(); ++g)
+      if (isDrawable({g})) return NamedGrid{g};
+    for (std::size_t g = 0; g < grids_.size(); ++g)
+      if (grids_[g].isVector) return NamedGrid{g, 0};
+    return std::nullopt;
+  }
+
+  [[nodiscard]] NamedGrid requiredDrawable() const {
+    if (const auto first = firstDrawable()) return *first;
+    throw BadInput(from_.path.string() +
+                   (grids_.empty() ? ": the file has no grid, so there is nothing to draw"
+                                   : ": no grid that can be drawn"));
+  }
+
+  [[nodiscard]] std::string nameOf(const NamedGrid& grid) const {
+    return grid.component ? names_.ofComponent(grid.place, *grid.component)
+                          : names_.unique(grid.place);
+  }
+
+  [[nodiscard]] Scene scene(const NamedGrid& named, bool allowEmpty = false) const {
+    const ReadOptions options{
+        .allowEmpty = allowEmpty, .maxBytes = from_.memory.maxBytes, .memory = from_.memory.voxels};
+    VolumeGrid grid = named.component
+                          ? readComponent(from_.path, named.place, *named.component, options)
+                          : readGrid(from_.path, named.place, options);
+    Scene scene;
+    scene.grid = nameOf(named);
+    scene.unit = unitOf(grid.descriptor);
+    scene.transform = grid.descriptor.transform;
+    scene.box = activeBox(grid.volume);
+    if (!scene.box.empty()) scene.data = activeRange(grid.volume);
+    scene.background = grid.volume.background;
+    scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
+    scene.content = std::move(grid);
+    return scene;
+  }
+
+  const SceneFile& from_;
+  std::vector<GridSummary> grids_;
+  GridNames names_;
+};
 
 }  // namespace
 
 std::vector<Scene> readScenes(const SceneFile& file) {
-  auto scenes = file.path.extension() == ".esvr" ? encoded(file) : voxels(file);
+  const cli::WatchedInputs watched({file.path});  // grid after grid is read from it
+  auto scenes = file.path.extension() == ".esvr" ? encoded(file) : GridsOfVdb(file).scenes();
+  watched.requireUnchanged();
   for (const Scene& scene : scenes)
     if (scene.box.empty())
       throw BadInput(file.path.string() + ", " + scene.grid + ": nothing active to draw");
@@ -142,17 +250,50 @@ std::vector<Scene> readScenes(const SceneFile& file) {
 }
 
 std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame, const SceneFile& file) {
-  return scenesBy(frame, file, [&](const StoredGrid& grid) { return complete(grid, file.memory); });
+  return scenesBy(frame, file, [&](const StoredGrid& grid, const std::string& name) {
+    return complete(grid, name, file.memory);
+  });
+}
+
+Scene outlineOf(const StoredGrid& grid, const std::string& name) {
+  Scene scene = propertiesOf(grid, name);
+  Field field;  // its ellipsoids are not drawn
+  field.fitFor = grid.field.fitFor;
+  scene.content = std::move(field);
+  return scene;
 }
 
 std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame, const SceneFile& file) {
-  return scenesBy(frame, file, [](const StoredGrid& grid) {
-    Scene scene = outlineOf(grid);
-    Field field;  // its ellipsoids are not drawn
-    field.fitFor = grid.field.fitFor;
-    scene.content = std::move(field);
-    return scene;
-  });
+  return scenesBy(frame, file, outlineOf);
+}
+
+std::optional<std::string> firstDrawable(const std::filesystem::path& path) {
+  SceneFile file;
+  file.path = path;
+  return GridsOfVdb(file).firstDrawableName();
+}
+
+namespace {
+
+EsvrFile readFrameFile(const SceneFile& file) {
+  ReadLimits limits{file.memory.maxBytes, file.memory.voxels};
+  limits.carriedBytes = false;
+  return readEsvr(file.path, limits);
+}
+
+}  // namespace
+
+std::optional<std::vector<Scene>> readFrame(const SceneFile& file) {
+  return file.path.extension() == ".esvr" ? scenesOf(readFrameFile(file), file)
+                                          : GridsOfVdb(file).frame();
+}
+
+std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file) {
+  if (file.path.extension() == ".esvr") return outlinesOf(readFrameFile(file), file);
+  auto scenes = GridsOfVdb(file).frame();
+  if (scenes)
+    for (Scene& scene : *scenes) scene.content = VolumeGrid{};
+  return scenes;
 }
 
 void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
@@ -185,8 +326,19 @@ DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& me
 
 void SceneRenderer::drawAlone(const Scene& scene, const DrawSettings& s) {
   const bool isNano = !s.shaded && (s.device.kind == DeviceKind::kCuda || s.values);
-  const auto* const voxels = std::get_if<VolumeGrid>(&scene.content);
+  const auto* voxels = std::get_if<VolumeGrid>(&scene.content);
+  if (!voxels && liesFarApart(scene)) {
+    const StoredGrid& stored = *scene.encoded;
+    farApart_ = VolumeGrid{
+        stored.descriptor,
+        decodeGrid(stored, {.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels}), 0};
+    voxels = &*farApart_;
+  }
   if (voxels && isNano) return sampleNano(*voxels, s);
+  if (farApart_) {
+    renderer_ = makeVolumeRenderer(farApart_->volume, s.device, s.limits);
+    return;
+  }
   const DrawnGrid grid = drawnGrid(scene, s.memory);
   if (const auto* const drawn = std::get_if<DrawnField>(&grid))
     renderer_ = makeFieldRenderer(*drawn->field, s.device, s.limits, drawn->voxels);

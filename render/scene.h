@@ -18,7 +18,7 @@ namespace esvr::render {
 /// A grid to draw.
 struct Scene {
   std::variant<Field, VolumeGrid> content;
-  std::string grid;  ///< name of the grid
+  std::string grid;  ///< name by which users find the grid (GridNames)
   std::string unit;  ///< unit of the values; empty if the grid has none
   Transform transform;
   Box box;          ///< bounding box of the active voxels
@@ -33,6 +33,8 @@ struct SceneFile {
   std::optional<std::string> grid;  ///< default: the first grid that can be drawn
   std::vector<std::string> with;    ///< further grids, which are drawn in the same picture
   cli::HostMemory memory;           ///< memory that input may take
+  /// Without `grid`, this grid is drawn if the file has one of this name that can be drawn.
+  std::optional<std::string> preferred{};
 };
 
 /// Reads the grid and the further grids of a file.
@@ -49,10 +51,22 @@ struct SceneFile {
 [[nodiscard]] std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame,
                                                          const SceneFile& file);
 
-/// The same without the voxels that the grids may store, which is enough for a camera and transfer
+/// The grids of a frame that is a file of its own, otherwise as scenesOf.
+[[nodiscard]] std::optional<std::vector<Scene>> readFrame(const SceneFile& file);
+
+/// The same without voxels and ellipsoids, as outlinesOf.
+[[nodiscard]] std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file);
+
+/// The name of the first grid of a .vdb or .nvdb file that can be drawn; nothing if there is none.
+[[nodiscard]] std::optional<std::string> firstDrawable(const std::filesystem::path& path);
+
+/// The same as scenesOf without the voxels that the grids may store, which is enough for a camera and transfer
 /// functions.
 [[nodiscard]] std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame,
                                                            const SceneFile& file);
+
+/// The same for one of EsvrFile::grids. \param name  by which users find it
+[[nodiscard]] Scene outlineOf(const StoredGrid& grid, const std::string& name);
 
 /// Widens scenes, so that their boxes and their ranges of values enclose those of others.
 void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes);
@@ -83,6 +97,7 @@ class SceneRenderer {
   void sampleNano(const VolumeGrid& grid, const DrawSettings& settings);
 
   std::deque<SparseVolume> decoded_;
+  std::optional<VolumeGrid> farApart_;
   NanoVolume nano_;
   std::unique_ptr<Renderer> renderer_;
 };

@@ -64,20 +64,35 @@ std::uint64_t bytesOfAll(const BesideFitted& beside, std::uint64_t size) {
 /// Subtracts without passing 0.
 std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
 
+/// True for a frame of a sequence in which nothing is active, so that a size cannot make it smaller.
+bool isEmptyFrame(const Options& options, const BesideFitted& file) {
+  const auto isActive = [](const GridSummary& grid) { return grid.activeVoxels > 0; };
+  return options.sequence && std::ranges::none_of(file.grids, isActive, &FittedGrid::source) &&
+         std::ranges::none_of(file.carried, [&](const CarriedGrid& grid) {
+           return isActive(file.input.grids.at(grid.place));
+         });
+}
+
 }  // namespace
 
 ByteShares::ByteShares(const Options& options, const VdbSummary& input,
                        const std::vector<FittedGrid>& grids, const Twins& twins,
                        const std::vector<CarriedGrid>& carried)
     : left_(sizeOf(options, input)), shares_(grids.size()) {
+  // A file without grids has nothing to divide, and no option makes it smaller.
+  if (input.grids.empty() || isEmptyFrame(options, {input, grids, carried})) left_.reset();
   if (!left_) return;
   *left_ -= bytesOfAll({input, grids, carried}, *left_);
   for (std::size_t g = 0; g < grids.size(); ++g) {
     if (const auto twin = twins.find(g); twin != twins.end())
       reserve(twin->second);
     else
-      weightLeft_ += shares_[g].weight = weightOf(grids[g]);
+      weightLeft_ += shares_[g].weight = weightOf(grids[g]), ++gridsLeft_;
   }
+  // The record of a grid, its rows in the table, and the codes of a few values. Shares by active
+  // voxels alone would be too small for a grid of a few voxels beside a large one.
+  constexpr std::uint64_t kLeastOfGrid = 512;
+  if (gridsLeft_ > 0) least_ = std::min(kLeastOfGrid, *left_ / gridsLeft_);
 }
 
 void ByteShares::reserve(const Twin& twin) {
@@ -90,7 +105,9 @@ void ByteShares::reserve(const Twin& twin) {
 
 std::optional<std::uint64_t> ByteShares::of(std::size_t grid) const {
   if (!left_) return std::nullopt;
-  return std::uint64_t(double(*left_) * shares_[grid].weight / weightLeft_);
+  const std::uint64_t divided = less(*left_, least_ * gridsLeft_);
+  const std::uint64_t least = std::min(least_, *left_ / gridsLeft_);
+  return least + std::uint64_t(double(divided) * shares_[grid].weight / weightLeft_);
 }
 
 std::uint64_t ByteShares::take(std::size_t grid, const StoredGrid& stored) {
@@ -100,6 +117,7 @@ std::uint64_t ByteShares::take(std::size_t grid, const StoredGrid& stored) {
   if (bytes > allowed) return bytes - allowed;
   left_ = less(*left_ + share.reserved, bytes);
   weightLeft_ -= share.weight;
+  --gridsLeft_;
   return 0;
 }
 

@@ -13,7 +13,8 @@
 
 namespace esvr::vdb2esvr {
 
-/// Grids share the bytes by their active voxels. Bytes that a grid does not use go to later grids.
+/// Every grid gets the few bytes that the smallest one takes, and grids share the others by their
+/// active voxels. A frame of a sequence without active voxels has no size to keep to. Bytes that a grid does not use go to later grids.
 /// Twins of a grid have no share; the bytes of their records are reserved.
 class ByteShares {
  public:
@@ -43,7 +44,9 @@ class ByteShares {
 
   std::optional<std::uint64_t> left_;  ///< bytes without those reserved
   double weightLeft_ = 0.0;
-  std::vector<Share> shares_;  ///< one for each grid; that of a twin is not used
+  std::uint64_t gridsLeft_ = 0;  ///< that have no bytes yet
+  std::uint64_t least_ = 0;      ///< bytes that every grid gets
+  std::vector<Share> shares_;    ///< one for each grid; that of a twin is not used
 };
 
 }  // namespace esvr::vdb2esvr

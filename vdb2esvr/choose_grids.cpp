@@ -2,21 +2,21 @@
 
 #include <algorithm>
 #include <set>
+#include <unordered_map>
+#include <utility>
 
+#include "cli/shell_word.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
 
 namespace esvr::vdb2esvr {
 namespace {
 
 using Places = std::set<std::size_t>;  // a set, so that a grid that is named twice counts once
 
-Places placesOf(const std::filesystem::path& file, const VdbSummary& summary,
+Places placesOf(const std::filesystem::path& file, const GridNames& grids,
                 const std::vector<std::string>& names) {
-  std::vector<std::string> stored;
-  for (const auto& grid : summary.grids) stored.push_back(grid.name);
   Places places;
-  for (const auto& name : names) places.insert(findGrid(stored, name, file));
+  for (const auto& name : names) places.insert(grids.findWhole(name, file));
   return places;
 }
 
@@ -31,9 +31,9 @@ struct WantedPlaces {
 };
 
 WantedPlaces wantedPlaces(const std::filesystem::path& file, const VdbSummary& summary,
-                          const WantedGrids& wanted) {
-  WantedPlaces places{placesOf(file, summary, wanted.only), placesOf(file, summary, wanted.keep),
-                      placesOf(file, summary, wanted.skip), wanted.only.empty()};
+                          const GridNames& names, const WantedGrids& wanted) {
+  WantedPlaces places{placesOf(file, names, wanted.only), placesOf(file, names, wanted.keep),
+                      placesOf(file, names, wanted.skip), wanted.only.empty()};
   for (const std::size_t place : places.skip)
     if (places.only.contains(place) || places.keep.contains(place))
       throw UsageError("--skip and " + std::string(places.only.contains(place) ? "-g" : "--keep") +
@@ -44,43 +44,60 @@ WantedPlaces wantedPlaces(const std::filesystem::path& file, const VdbSummary& s
 /// The reason why a grid is not fitted; empty if it is.
 std::string whyCarried(const GridSummary& grid, bool isKept, bool lossless) {
   if (isKept) return "--keep names it";
-  if (!grid.isVector) return grid.skipReason;
-  return lossless && grid.valueType == "vec3d"
-             ? "its vectors are of doubles, which a lossless file cannot hold in another way"
+  if (!grid.skipReason.empty() && !grid.isVector) return grid.skipReason;
+  const bool isDouble = grid.valueType == "double" || grid.valueType == "vec3d";
+  return lossless && isDouble && grid.whyNotCarried.empty()
+             ? "its values are doubles, which a lossless file cannot hold in another way"
              : "";
 }
 
-void addFitted(const GridSummary& grid, std::size_t place, std::vector<FittedGrid>& fitted) {
-  if (!grid.isVector) return fitted.push_back({grid, place});
-  for (std::size_t c = 0; c < kComponents; ++c) fitted.push_back({grid, place, c});
+void addFitted(const GridSummary& grid, std::size_t place, const GridNames& names,
+               std::vector<FittedGrid>& fitted) {
+  if (!grid.isVector) return fitted.push_back({grid, place, std::nullopt, names.unique(place)});
+  for (std::size_t c = 0; c < kComponents; ++c)
+    fitted.push_back({grid, place, c, names.ofComponent(place, c)});
+}
+
+void numberThoseOfOneName(std::vector<FittedGrid>& fitted) {
+  std::unordered_map<std::string, std::size_t> counts;
+  for (FittedGrid& grid : fitted) grid.number = counts[grid.storedName()]++;
 }
 
 void refuseLostGrids(const std::filesystem::path& file, const std::vector<NotFitted>& carried) {
-  std::string text;
-  for (const auto& [grid, place, why] : carried)
-    if (!grid.whyNotCarried.empty())
-      text += "\n  grid \"" + grid.uniqueName + "\" can be neither fitted (" + why +
-              ") nor carried (" + grid.whyNotCarried + ')';
+  std::string text, skips;
+  for (const auto& [grid, place, why] : carried) {
+    if (grid.whyNotCarried.empty()) continue;
+    text += "\n  grid \"" + grid.uniqueName + "\" can be neither fitted (" + why +
+            ") nor carried (" + grid.whyNotCarried + ')';
+    skips += " --skip " + cli::shellWord(grid.uniqueName);
+  }
   if (!text.empty())
-    throw BadInput(file.string() + ": grids would be lost; --skip NAME leaves them out" + text);
+    throw BadInput(file.string() + ": grids would be lost unless they are left out by" + skips +
+                   text);
 }
 
 void refuseNothing(const std::filesystem::path& file, const VdbSummary& summary,
                    const GridChoice& choice) {
-  if (!choice.fitted.empty() || !choice.carried.empty()) return;
-  throw BadInput(file.string() + (summary.grids.empty() ? ": the file has no grid"
-                                                        : ": all grids of the file are left out"));
+  if (choice.fitted.empty() && choice.carried.empty() && !summary.grids.empty())
+    throw BadInput(file.string() + ": all grids of the file are left out");
 }
 
 }  // namespace
 
-std::string FittedGrid::uniqueName() const {
-  return component ? componentName(source.uniqueName, *component) : source.uniqueName;
+std::string FittedGrid::storedName() const {
+  return component ? componentName(source.name, *component) : source.name;
+}
+
+GridNames namesOf(const VdbSummary& file) {
+  std::vector<std::string> names;
+  for (const GridSummary& grid : file.grids) names.push_back(grid.name);
+  return GridNames(std::move(names));
 }
 
 GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
                        const WantedGrids& wanted) {
-  const WantedPlaces places = wantedPlaces(file, summary, wanted);
+  const GridNames names = namesOf(summary);
+  const WantedPlaces places = wantedPlaces(file, summary, names, wanted);
   GridChoice choice;
   for (std::size_t i = 0; i < summary.grids.size(); ++i) {
     const GridSummary& grid = summary.grids[i];
@@ -88,10 +105,11 @@ GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summ
     if (places.skip.contains(i))
       choice.skipped.push_back({grid, i, "--skip names it"});
     else if (places.wants(i) && why.empty())
-      addFitted(grid, i, choice.fitted);
+      addFitted(grid, i, names, choice.fitted);
     else if (places.wants(i))
       choice.carried.push_back({grid, i, why});
   }
+  numberThoseOfOneName(choice.fitted);
   refuseLostGrids(file, choice.carried);
   refuseNothing(file, summary, choice);
   return choice;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "esvr/grid_names.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::vdb2esvr {
@@ -16,7 +17,7 @@ struct WantedGrids {
   std::vector<std::string> only;  ///< empty: all grids
   std::vector<std::string> keep;  ///< carried unchanged, even if they could be fitted
   std::vector<std::string> skip;  ///< left out
-  bool lossless = false;  ///< whether doubles, which are fitted as float32, are carried in vectors
+  bool lossless = false;          ///< whether doubles, which are fitted as float32, are carried
 };
 
 /// A grid that is not fitted, and the reason.
@@ -31,10 +32,15 @@ struct FittedGrid {
   GridSummary source;                      ///< the grid of the input
   std::size_t place = 0;                   ///< its index in VdbSummary::grids
   std::optional<std::size_t> component{};  ///< of vectors
-  std::optional<double> peak{};            ///< peak of the PSNR of vectors (findPeaks)
+  std::string uniqueName;        ///< of the grid or the component, by GridNames of the input
+  std::size_t number = 0;        ///< of the fitted grids before it that are stored by the same name
+  std::optional<double> peak{};  ///< peak of the PSNR of vectors (findScales)
+  std::optional<double> range{};  ///< of vectors, to which a bound in % refers (findScales)
 
-  /// The unique name of the grid, or componentName() of it.
-  [[nodiscard]] std::string uniqueName() const;
+  /// The grid or the component, which tells it from all others of the input.
+  [[nodiscard]] NamedGrid id() const { return {place, component}; }
+  /// The name by which it is stored: GridSummary::name, or componentName() of it.
+  [[nodiscard]] std::string storedName() const;
 };
 
 struct GridChoice {
@@ -42,8 +48,12 @@ struct GridChoice {
   std::vector<NotFitted> carried, skipped;
 };
 
-/// \throws BadInput  a named grid does not exist (the text lists the grids); a grid can be neither
-///                   fitted nor carried; or no grid is left
+/// The names of the grids of a file, by which options name them.
+[[nodiscard]] GridNames namesOf(const VdbSummary& file);
+
+/// A file without any grid is a valid choice of none; a program for simulations may begin so.
+/// \throws BadInput  a named grid does not exist or its name is ambiguous (the text lists the grids); a
+///                   grid can be neither fitted nor carried; or no grid of a file that has some is left
 /// \throws UsageError  a grid is named by --skip and by another option
 [[nodiscard]] GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
                                      const WantedGrids& wanted);

@@ -28,6 +28,10 @@ cli::ProgramText programText() {
           "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...\n"
           "  vdb2esvr IN.####.vdb OUT.esvr [--frames 1-100x2] [--gop N] ...",
       .notes =
+          "IN.vdb may be - for standard input, or a pipe such as <(...). Its bytes are copied to a "
+          "file in the folder of --scratch, which has no name. If an input changes while it is "
+          "read, the run fails.\n"
+          "\n"
           "Without -g, all grids are converted. Grids of vectors are fitted by components, unless "
           "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: those "
           "that are not of floats, doubles or vectors of them (integers, masks, strings, points), "
@@ -39,7 +43,8 @@ cli::ProgramText programText() {
           "Without a goal, each grid gets the quality of --preset in as few bytes as were found; a "
           "grid of more than 33 million voxels in bricks gets a single fit instead. --size and "
           "--ratio search for the best file that is not larger. Several grids share the bytes in "
-          "proportion to their active voxels, and the bytes of carried grids count. --psnr "
+          "proportion to their active voxels, after each got a few hundred, and the bytes of "
+          "carried grids count. A frame of a sequence without active voxels has no size. --psnr "
           "searches for the smallest file that reaches the PSNR; --count then limits the number of "
           "ellipsoids. In all these cases, the program chooses for each grid between ellipsoids "
           "and quantised voxels. It makes only a short fit if that shows that voxels are better. "
@@ -57,8 +62,9 @@ cli::ProgramText programText() {
           "The program prints a table on stdout. Its PSNR and largest error are measured on the "
           "voxels that are decoded from the written file.\n"
           "\n"
-          "Ctrl-C ends the fit, and the exit code is 1. --on-cancel chooses whether the best "
-          "result so far is written. A second Ctrl-C ends the program at once. OUT.esvr is never "
+          "Ctrl-C and SIGTERM end the run within two seconds, and the exit code is 1. --on-cancel "
+          "chooses whether the best result so far is written; a message says so if completing it "
+          "takes longer. A second Ctrl-C ends the program at once. OUT.esvr is never "
           "incomplete. With --resume, the same command continues a run that was interrupted.\n"
           "\n"
           "If OUT has a pattern, each frame of a sequence is converted as a file of its own, which "
@@ -67,8 +73,10 @@ cli::ProgramText programText() {
           "group. Until the file is complete, it has the name OUT.esvr.partial. Without a goal, "
           "all frames have the PSNR of --preset, whatever their size.\n"
           "\n"
-          "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. Frames are "
-          "converted at the same time on the threads of --threads, or up to four on each GPU of "
+          "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. In OUT, "
+          "only "
+          "the name of the file may have one; folders stand for themselves. Frames are converted "
+          "at the same time on the threads of --threads, or up to four on each GPU of "
           "--device, as far as --max-memory allows. A frame that fails is named, and does not stop "
           "the others (--on-error stop); the exit code is that of the first one. Ctrl-C keeps the "
           "frames that are complete, or the groups that are complete in one file. With --resume, "
@@ -87,7 +95,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
           "  vdb2esvr frame.vdb frame.esvr --skip velocity       # all grids but one\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            # every voxel within the bound\n"
-          "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4 --resume\n"
+          "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4GB --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
           "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
           "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file"};
@@ -105,9 +113,11 @@ void addGoalOptions(cli::po::options_description& options) {
     ("psnr", value<std::string>()->value_name("DB"),
      "write the smallest file that reaches this PSNR over the box; NAME=DB is that of one grid: "
      "density=50,temperature=40, or 40,density=50 with 40 for all others")
-    ("lossless", bool_switch(), "store voxels and active mask bit for bit, without ellipsoids")
+    ("lossless", bool_switch(),
+     "store voxels and active mask bit for bit, without ellipsoids; grids that have other inactive "
+     "values than the background are carried unchanged")
     ("max-error", value<std::string>()->value_name("E"),
-     "keep the error of every voxel within E, or within E% of the range of values; NAME=E is the "
+     "keep the error of every voxel within E, or within E% of the range of the active values (of vectors: of the component with the largest range); NAME=E is the "
      "bound of one grid, as with --psnr; if ellipsoids are stored, they have a residual; a sample of "
      "the grid shows whether they may be smaller")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
@@ -156,8 +166,9 @@ void addFitOptions(cli::po::options_description& options) {
   cli::addDevice(options, {}, "; cuda:0,1 or cuda:all fit the chunks of a volume on several GPUs");
   // clang-format off
   options.add_options()
-    ("max-vram", value<double>()->value_name("GB"),
-     "GPU memory to use (default: all free memory); a volume that does not fit is fitted in chunks")
+    ("max-vram", value<std::string>()->value_name("BYTES"),
+     "GPU memory to use, for example 4GB or 64MB; a number below 1000000 without a unit is one of GB "
+     "(default: all free memory); a volume that does not fit is fitted in chunks")
     ("chunk-voxels", value<std::int64_t>()->value_name("N"),
      "fit the volume in chunks of about N active voxels (default: one chunk if it fits)");
   // clang-format on
@@ -167,7 +178,8 @@ void addFileOptions(cli::po::options_description& options) {
   // clang-format off
   options.add_options()
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
-     "convert this grid only; may be repeated; 'density[1]' is the second grid of that name")
+     "convert this grid only; may be repeated; 'density[1]' is the second grid of that name "
+     "(the README has all rules)")
     ("keep", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "carry this grid unchanged instead of fitting it; may be repeated; with -g, in addition to the "
      "grids that -g names")
@@ -178,7 +190,8 @@ void addFileOptions(cli::po::options_description& options) {
      "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
      "--ratio; or the names of the grids that may share, as density,temperature")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
-     "refuse: fail on NaN or infinite voxels; zero: replace them by 0")
+     "refuse: fail on NaN or infinite voxels; zero, background or a number: replace them by 0, by the "
+     "background of the grid or by that number")
     ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
      "keep or discard the best result so far if the run is interrupted (with --resume: discard, "
      "because the finished parts are kept)")
@@ -196,6 +209,7 @@ void addFileOptions(cli::po::options_description& options) {
 cli::CommandLine commandLine() {
   cli::CommandLine line(programText());
   line.argument("input", "IN.vdb");
+  line.volumeInputs({"input"});
   line.argument("output", "OUT.esvr");
   addFileOptions(line.options());
   addFrameOptions(line.options());

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "cli/stopwatch.h"
+#include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 #include "esvr/psnr_between.h"
 #include "vdb2esvr/source.h"
 
@@ -23,14 +23,23 @@ void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedG
   grid.paper = std::move(made.record);
 }
 
-/// The same grid of the previous frame; null if there is none.
-const StoredGrid* previousOf(const Options& options, const std::string& uniqueName) {
+/// The same grid of the previous frame, which is the one with its number among those that are stored by
+/// its name; null if there is none.
+const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted) {
   if (!options.previous) return nullptr;
-  std::vector<std::string> names;
-  for (const StoredGrid& grid : options.previous->grids) names.push_back(grid.descriptor.name);
-  names = uniqueNames(names);
-  const auto at = std::ranges::find(names, uniqueName);
-  return at == names.end() ? nullptr : &options.previous->grids[std::size_t(at - names.begin())];
+  const std::string name = fitted.storedName();
+  std::size_t before = 0;
+  for (const StoredGrid& grid : options.previous->grids)
+    if (grid.descriptor.name == name && before++ == fitted.number) return &grid;
+  return nullptr;
+}
+
+/// The goal of a grid. A bound in % of the range of vectors is the same for all components.
+Goal resolvedGoal(const Options& options, const FittedGrid& fitted) {
+  Goal goal = goalOf(options, fitted);
+  if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && fitted.range)
+    *within = {within->bound * *fitted.range, false};
+  return goal;
 }
 
 /// What a grid is converted to.
@@ -61,7 +70,8 @@ void countHits(const SparseVolume& source, ConvertedGrid& grid) {
 /// The error of the sum between voxels, where it is meant to be drawn.
 std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid& grid,
                                    const CommonFitOptions& fit) {
-  if (grid.field.fitFor == FitFor::kVoxels || grid.field.ellipsoidCount() == 0) return std::nullopt;
+  const bool isDrawn = grid.field.fitFor == FitFor::kDrawing && !grid.farBackground;
+  if (!isDrawn || grid.field.ellipsoidCount() == 0) return std::nullopt;
   const RevoxeliseOptions rule = voxelRule(grid);
   return psnrBetween(
       source, grid.field,
@@ -83,18 +93,45 @@ std::optional<SurfaceErrors> surfaceErrors(const VolumeGrid& source, const Volum
 /// A converted grid that has its names only.
 ConvertedGrid named(const FittedGrid& fitted) {
   ConvertedGrid grid;
-  grid.uniqueName = fitted.uniqueName();
+  grid.uniqueName = fitted.uniqueName;
   grid.sourceName = fitted.source.uniqueName;
-  grid.component = fitted.component;
+  grid.id = fitted.id();
   return grid;
 }
 
-}  // namespace
+/// The errors that a summary needs.
+VolumeGrid measureValues(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  const CommonFitOptions& fit = options.convert.fit;
+  VolumeGrid decoded{.descriptor = source.descriptor,
+                     .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
+  grid.metrics = compareVolumes(source.volume, decoded.volume, {.box = fit.box, .peak = fit.peak});
+  return decoded;
+}
 
-ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
-                          std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
+void measureAll(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  const VolumeGrid decoded = measureValues(options, source, grid);
+  grid.surface = surfaceErrors(source, decoded);
+  if (source.descriptor.gridClass == GridClass::kLevelSet)
+    grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
+  grid.psnrBetween = errorBetween(source.volume, grid.stored(), options.convert.fit);
+  if (options.countHits) countHits(source.volume, grid);
+}
+
+/// Measures a conversion. If that is cancelled, the values only.
+void measure(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
+  try {
+    CancelScope::check();
+    return measureAll(options, source, grid);
+  } catch (const Cancelled&) {
+  }
+  const BestSoFar completion;
+  (void)measureValues(options, source, grid);
+}
+
+ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
+                             std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
   Options options = given;
-  options.convert.goal = goalOf(given, fitted);
+  options.convert.goal = resolvedGoal(given, fitted);
   CommonFitOptions& fit = options.convert.fit;
   fit.peak = fitted.peak;
   ConvertedGrid grid = named(fitted);
@@ -103,36 +140,37 @@ ConvertedGrid convertGrid(const Options& given, const FittedGrid& fitted,
   const VolumeGrid source = readSource(options, fitted);
   grid.bricks = source.volume.brickCount();
   grid.nonFiniteReplaced = source.nonFiniteReplaced;
+  grid.inactive = source.inactive;
   grid.seconds.read = watch.lap();
 
   grid.device = deviceName(fit.device);
-  convert(options, source, {bytes, expected ? expected : previousOf(options, grid.uniqueName)},
-          grid);
+  convert(options, source, {bytes, expected ? expected : previousOf(options, fitted)}, grid);
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
   if (options.job == Job::kPart) return grid;
 
-  const VolumeGrid decoded{
-      .descriptor = source.descriptor,
-      .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
-  grid.metrics = compareVolumes(source.volume, decoded.volume, {.box = fit.box, .peak = fit.peak});
-  grid.surface = surfaceErrors(source, decoded);
-  if (source.descriptor.gridClass == GridClass::kLevelSet)
-    grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
-  grid.psnrBetween = errorBetween(source.volume, grid.stored(), fit);
+  measure(options, source, grid);
   grid.seconds.measure = watch.lap();
-  if (options.countHits) countHits(source.volume, grid);
   return grid;
+}
+
+}  // namespace
+
+ConvertedGrid convertGrid(const Options& options, const FittedGrid& fitted,
+                          std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
+  return sayingTheWayOut(fitted, [&] { return readAndConvert(options, fitted, bytes, expected); });
 }
 
 ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted, const Twin& twin) {
   ConvertedGrid made = grid;
-  made.uniqueName = fitted.uniqueName();
+  made.uniqueName = fitted.uniqueName;
   made.sourceName = fitted.source.uniqueName;
-  made.component = fitted.component;
+  made.id = fitted.id();
   made.conversion.grid.descriptor = twin.descriptor;
   made.nonFiniteReplaced = twin.nonFiniteReplaced;
+  made.twinOf = grid.id;
+  made.inactive = twin.inactive;
   made.sameAs = grid.uniqueName;
   made.seconds = {.read = twin.secondsRead};
   return made;

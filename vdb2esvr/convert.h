@@ -34,9 +34,9 @@ struct SharedBytes {
 };
 
 struct ConvertedGrid {
-  std::string uniqueName;                ///< FittedGrid::uniqueName()
-  std::string sourceName;                ///< GridSummary::uniqueName of the grid of the input
-  std::optional<std::size_t> component;  ///< of vectors
+  std::string uniqueName;  ///< FittedGrid::uniqueName
+  std::string sourceName;  ///< GridSummary::uniqueName of the grid of the input
+  NamedGrid id;            ///< FittedGrid::id(): its place in the input
   Conversion conversion;
   VolumeMetrics metrics;                 ///< errors of the decoded grid
   std::optional<double> wantedPsnr;      ///< PSNR over the box that the grid should reach, dB
@@ -45,12 +45,14 @@ struct ConvertedGrid {
   std::optional<double> psnrBetween;     ///< of ellipsoids that were fitted for drawing, dB
   std::size_t bricks = 0;                ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
+  InactiveValues inactive;                  ///< of the source, which the file does not hold
   std::string device;                       ///< name of the device that fitted the grid
   std::optional<double> hits;               ///< averageHits, with --hits
   std::optional<std::uint64_t> voxelPairs;  ///< those of countHits in the source's bricks, --hits
   std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
   std::optional<SharedBytes> shared;        ///< nothing if it shares nothing
-  std::optional<std::string> sameAs;        ///< unique name of the grid that this one is a twin of
+  std::optional<NamedGrid> twinOf;          ///< id of the grid that this one is a twin of
+  std::string sameAs;                       ///< unique name of that grid
   PhaseSeconds seconds;
 
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }

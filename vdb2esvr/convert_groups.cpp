@@ -165,6 +165,7 @@ class FileOfGroups {
   }
 
   void append(std::vector<EncodedFrame>& frames) {
+    const Completion completion;  // a group that is converted is kept
     for (EncodedFrame& frame : frames) {
       FrameRecord& record = conversion_.frames()[frame.index];
       if (record.gridsDiffer) writer_.endGroup();

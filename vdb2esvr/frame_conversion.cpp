@@ -45,9 +45,9 @@ std::uint64_t sharedMemoryOf(const Device& device, const Options& options) {
 }
 
 /// The memory that the conversion of a file may take, bytes.
-std::uint64_t memoryOf(const Options& options) {
+std::uint64_t memoryOf(Options options) {
   const VdbSummary file = inspectVdb(options.input);
-  return conversionMemory(file, chooseGrids(options.input, file, options.grids));
+  return conversionMemory(file, chooseFor(options, file));
 }
 
 }  // namespace
@@ -58,6 +58,7 @@ FrameConversion::FrameConversion(const Options& options, const std::vector<cli::
       cancel_(cancel),
       devices_(selectDevices(options.device)),
       gate_(options.read.maxBytes),
+      working_(devices_),
       bar_(options.input.string(), options.progress, options.verbosity),
       log_(kProgram, options.verbosity) {
   for (const Device& device : devices_)
@@ -96,14 +97,51 @@ void FrameConversion::fail(FrameRecord& frame, const Error& error) {
 Options FrameConversion::optionsOf(const cli::Frame& frame, int worker) const {
   Options own = options_;
   own.input = frame.input, own.output = frame.output;
-  if (devices_.size() > 1)
-    own.device = deviceOption(devices_[std::size_t(worker) % devices_.size()]);
+  if (devices_.size() > 1) own.device = deviceOption(deviceFor(std::size_t(worker)));
   own.progress = ProgressForm::kText;
   own.verbosity = cli::Verbosity::kQuiet;
   return own;
 }
 
-void FrameConversion::convert(const Options& own, FrameRecord& frame, const StoreFile& store) {
+/// One of the devices that have not failed.
+Device FrameConversion::deviceFor(std::size_t worker) const {
+  const std::lock_guard lock(mutex_);
+  const Device& own = devices_[worker % devices_.size()];
+  if (std::ranges::count(working_, own) > 0) return own;
+  return working_[worker % working_.size()];
+}
+
+/// Gives a frame whose device has failed another one, and all later frames.
+/// \return false if none is left
+bool FrameConversion::replaceDevice(const DeviceError& error, Options& own) {
+  if (devices_.size() < 2) return false;
+  const Device failed = selectDevices(own.device).front();
+  const std::lock_guard lock(mutex_);
+  std::vector<Device> left = working_;
+  const bool isNew = std::erase(left, failed) > 0;
+  if (left.empty()) return false;
+  working_ = std::move(left);
+  own.device = deviceOption(working_.front());
+  if (!isNew) return true;
+  bar_.hide();
+  log_.warning(deviceName(failed) + " is not used any more: " + error.what() +
+               "; the other devices go on");
+  return true;
+}
+
+void FrameConversion::convert(const Options& given, FrameRecord& frame, const StoreFile& store) {
+  Options own = given;
+  for (;;) {
+    try {
+      return convertOnDevice(own, frame, store);
+    } catch (const DeviceError& error) {
+      if (!replaceDevice(error, own)) throw;
+    }
+  }
+}
+
+void FrameConversion::convertOnDevice(const Options& own, FrameRecord& frame,
+                                      const StoreFile& store) {
   const std::uint64_t bytes = memoryOf(own);
   const auto memory = gate_.take(bytes);
   const auto onDevice = deviceGates_.at(selectDevices(own.device).front().index).take(bytes);

@@ -40,7 +40,8 @@ class FrameConversion {
   /// The options with which a frame is converted. The bar of a fit is not shown.
   [[nodiscard]] Options optionsOf(const cli::Frame& frame, int worker) const;
 
-  /// Converts a frame as soon as there is memory for it, on the host and on its GPU.
+  /// Converts a frame as soon as there is memory for it, on the host and on its GPU. If its GPU fails,
+  /// another one of several converts it.
   /// \param own  options of the frame
   void convert(const Options& own, FrameRecord& frame, const StoreFile& store);
 
@@ -50,6 +51,9 @@ class FrameConversion {
   [[nodiscard]] SequenceRecord finish();
 
  private:
+  void convertOnDevice(const Options& own, FrameRecord& frame, const StoreFile& store);
+  [[nodiscard]] Device deviceFor(std::size_t worker) const;
+  bool replaceDevice(const DeviceError& error, Options& own);
   void fail(FrameRecord& frame, const Error& error);
   void tellEnd(const FrameRecord& frame);
   [[nodiscard]] double secondsSoFar();
@@ -61,7 +65,8 @@ class FrameConversion {
   std::map<int, cli::MemoryGate> deviceGates_;  ///< by Device::index
   cli::FrameWarnings warnings_;
   SequenceRecord record_;
-  std::mutex mutex_;  ///< of the members below
+  mutable std::mutex mutex_;     ///< of the members below
+  std::vector<Device> working_;  ///< the devices that have not failed
   ProgressBar bar_;
   const cli::Log log_;
   SequenceProgress progress_;

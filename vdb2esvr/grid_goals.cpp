@@ -1,6 +1,7 @@
 #include "vdb2esvr/grid_goals.h"
 
 #include <algorithm>
+#include <set>
 #include <utility>
 #include <variant>
 
@@ -44,7 +45,7 @@ double psnrIn(const std::string& text) {
 
 void addGoal(const std::string& grid, Goal goal, Options& options) {
   if (std::ranges::count(options.gridGoals, grid, &GridGoal::grid) > 0)
-    throw UsageError("grid \"" + grid + "\" has two goals");
+    throw UsageError("grid \"" + shownName(grid) + "\" has two goals");
   options.gridGoals.push_back({grid, std::move(goal)});
 }
 
@@ -74,17 +75,19 @@ void readGridGoals(const cli::Arguments& a, Options& options) {
 }
 
 void resolveNames(const VdbSummary& input, Options& options) {
-  std::vector<std::string> names;
-  for (const GridSummary& grid : input.grids) names.push_back(grid.name);
-  const auto resolve = [&](std::string& name) {
-    name = input.grids[findGrid(names, name, options.input)].uniqueName;
-  };
-  for (GridGoal& own : options.gridGoals) resolve(own.grid);
-  for (std::string& name : options.sharing.names) resolve(name);
+  const GridNames names = namesOf(input);
+  std::set<std::size_t> withGoals;
+  for (GridGoal& own : options.gridGoals) {
+    own.place = names.findWhole(own.grid, options.input);
+    if (!withGoals.insert(own.place).second)
+      throw UsageError("grid \"" + names.unique(own.place) + "\" has two goals");
+  }
+  for (const std::string& name : options.sharing.names)
+    options.sharing.places.insert(names.findWhole(name, options.input));
 }
 
 std::optional<std::size_t> ownGoalOf(const Options& options, const FittedGrid& grid) {
-  const auto own = std::ranges::find(options.gridGoals, grid.source.uniqueName, &GridGoal::grid);
+  const auto own = std::ranges::find(options.gridGoals, grid.place, &GridGoal::place);
   if (own == options.gridGoals.end()) return std::nullopt;
   return std::size_t(own - options.gridGoals.begin());
 }

@@ -17,6 +17,7 @@ struct Options;
 struct GridGoal {
   std::string grid;  ///< name in the input; a grid of vectors stands for its components
   Goal goal;
+  std::size_t place = 0;  ///< of the grid in the input (resolveNames)
 };
 
 /// Reads the values of --psnr and --max-error, such as "40" or "40,density=50": the value without a
@@ -24,8 +25,9 @@ struct GridGoal {
 /// \throws UsageError  a value is not of this form or out of range; a grid is named twice
 void readGridGoals(const cli::Arguments& arguments, Options& options);
 
-/// Gives the names of grids in options the form of GridSummary::uniqueName.
-/// \throws BadInput  there is no grid of a name; the text lists the grids
+/// Finds the places of the grids that options name.
+/// \throws BadInput  there is no grid of a name, or it is ambiguous; the text lists the grids
+/// \throws UsageError  two goals are those of one grid
 void resolveNames(const VdbSummary& input, Options& options);
 
 /// The index in Options::gridGoals of a grid's own goal, if it has one.

@@ -30,6 +30,15 @@ const char* nameOf(FitEnd end) {
   return "";
 }
 
+/// The inactive values that the file does not hold; null if there is none.
+Json inactiveOf(const InactiveValues& values) {
+  if (values.count() == 0) return nullptr;
+  const bool hasRange = values.count() > values.nonFinite();
+  return {{"count", values.count()},
+          {"value_range", hasRange ? Json{values.min(), values.max()} : Json(nullptr)},
+          {"nonfinite", values.nonFinite()}};
+}
+
 Json sourceOf(const ConvertedGrid& grid) {
   const StoredGrid& stored = grid.stored();
   return {{"class", className(stored.descriptor.gridClass)},
@@ -40,7 +49,8 @@ Json sourceOf(const ConvertedGrid& grid) {
           {"active_box", toJson(stored.activeBox)},
           {"bricks", grid.bricks},
           {"value_range", {stored.valueMin, stored.valueMax}},
-          {"nonfinite_replaced", grid.nonFiniteReplaced}};
+          {"nonfinite_replaced", grid.nonFiniteReplaced},
+          {"inactive_lost", inactiveOf(grid.inactive)}};
 }
 
 Json kernelOf(const Kernel& kernel) {
@@ -173,7 +183,7 @@ Json stabilityOf(const StoredGrid& grid) {
   constexpr std::size_t kSamples = 32;
   if (grid.field.ellipsoidCount() == 0) return nullptr;
   const Stability stability = measureStability(grid.field, cli::stabilityOptionsOf(grid, kSamples));
-  Json json{{"correct_digits", correctDigits(stability.largest, cli::largestMagnitude(grid))}};
+  Json json{{"correct_digits", correctDigits(stability.largest, cli::peakOfSource(grid))}};
   json.update(cli::differencesJson(stability));
   json.update(cli::difficultiesJson(stability));
   return json;
@@ -184,8 +194,8 @@ Json stabilityOf(const StoredGrid& grid) {
 Json gridJson(const RunRecord& record, std::size_t g) {
   const ConvertedGrid& grid = record.grids[g];
   return {{"name", grid.uniqueName},
-          {"component_of", grid.component ? Json(grid.sourceName) : Json(nullptr)},
-          {"same_as", orNull(grid.sameAs)},
+          {"component_of", grid.id.component ? Json(grid.sourceName) : Json(nullptr)},
+          {"same_as", grid.twinOf ? Json(grid.sameAs) : Json(nullptr)},
           {"shared", sharedOf(grid)},
           {"source", sourceOf(grid)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},

@@ -1,5 +1,6 @@
 #include "vdb2esvr/options.h"
 
+#include <cmath>
 #include <limits>
 
 #include "cli/box_option.h"
@@ -25,9 +26,8 @@ using cli::requireRange;
 constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kLongestRun = 1e9;  // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr double kMaxLoss = 20.0;                  // dB
-constexpr double kMinVram = 1e-3, kMaxVram = 1e6;  // GB
-constexpr float kLargestKappa = 1e4f;              // kernel.h
+constexpr double kMaxLoss = 20.0;      // dB
+constexpr float kLargestKappa = 1e4f;  // kernel.h
 
 /// An option's number, which must be within [low, high], converted to another type.
 template <class To, class From>
@@ -57,8 +57,8 @@ FitOptions fitOptions(const Arguments& a) {
   fit.voxelShare = *bounded<double>(a, "voxel-share", 0.0, 1.0);
   if (!a.values["voxel-share"].defaulted() && fit.fitFor != FitFor::kDrawing)
     throw UsageError("--voxel-share needs --fit-for drawing");
-  if (const auto gigabytes = bounded<double>(a, "max-vram", kMinVram, kMaxVram))
-    fit.maxDeviceBytes = std::size_t(*gigabytes * 1e9);
+  if (const auto memory = a.find<std::string>("max-vram"))
+    fit.maxDeviceBytes = std::size_t(cli::parseDeviceMemory("max-vram", *memory));
   fit.chunkVoxels = bounded<std::uint64_t>(a, "chunk-voxels", std::int64_t{1},
                                            std::numeric_limits<std::int64_t>::max());
   fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
@@ -173,9 +173,17 @@ void requireRepresentation(const Arguments& a, const Options& options) {
     throw UsageError("--representation voxels cannot be combined with --storage float32");
 }
 
-NonFinite nonFinite(const Arguments& a) {
-  return cli::choose<NonFinite>("nonfinite", a.get<std::string>("nonfinite"),
-                                {{"refuse", NonFinite::kRefuse}, {"zero", NonFinite::kZero}});
+/// \throws UsageError  the text is no word and no finite float
+void readNonFinite(const Arguments& a, ReadOptions& read) {
+  const auto text = a.get<std::string>("nonfinite");
+  if (text == "refuse" || text == "error") return;
+  read.nonFinite = text == "background" ? NonFinite::kBackground : NonFinite::kValue;
+  if (text == "zero" || text == "background") return;
+  const auto value = cli::parseNumber(text);
+  if (!value || !std::isfinite(float(*value)))
+    throw UsageError("--nonfinite must be refuse, zero, background or a number such as -1, not '" +
+                     text + "'");
+  read.nonFiniteValue = float(*value);
 }
 
 ProgressForm progressForm(const Arguments& a) {
@@ -196,10 +204,12 @@ WantedSharing sharing(const Arguments& a) {
 }
 
 void readMemory(const Arguments& a, Options& options) {
+  constexpr std::uint64_t kVolumes = 3;    // the source, its codes and what they decode to
   constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
   const cli::HostMemory memory = cli::hostMemoryOf(a);
   options.read.maxBytes = memory.maxBytes;
   options.read.memory = memory.voxels;
+  options.read.volumes = kVolumes;
   options.convert.fit.maxHostBytes = memory.maxBytes / kFitsShare;
 }
 
@@ -212,6 +222,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   Options options;
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
+  options.inputs = a.inputs;
   options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip"), false};
   options.sharing = sharing(a);
   readGridGoals(a, options);
@@ -224,7 +235,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.grids.lossless = a.get<bool>("lossless");
   options.convert.representation = representation(a);
   requireRepresentation(a, options);
-  options.read.nonFinite = nonFinite(a);
+  readNonFinite(a, options.read);
   readMemory(a, options);
   options.device = cli::deviceOf(a);
   options.onCancel = onCancel(a);

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -32,10 +33,12 @@ enum class OnCancel { kKeep, kDiscard };
 struct WantedSharing {
   bool isOn = true;
   std::vector<std::string> names;  ///< empty: all grids
+  std::set<std::size_t> places{};  ///< of the named grids in the input (resolveNames)
 };
 
 struct Options {
   std::filesystem::path input, output;
+  cli::InputFiles inputs;
   /// The frames, if the input is a pattern. The output is a pattern, too, or one file for all
   /// frames.
   std::optional<cli::Sequence> sequence;

@@ -49,6 +49,8 @@ void readParts(const cli::Arguments& a, Options& options) {
     options.share = partShare(*part);
   }
   const bool isStored = options.resume || options.job != Job::kWhole;
+  if (isStored && !options.inputs.piped.empty())
+    throw UsageError("parts are fitted in several runs, which need an input file, not a pipe");
   if (isStored && options.paper) throw UsageError("fits by --paper have no parts");
   // An interrupted run is continued later. A share of the parts has no result to keep.
   if (options.job == Job::kPart || (isStored && a.values["on-cancel"].defaulted()))

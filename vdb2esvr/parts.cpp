@@ -4,6 +4,7 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <system_error>
+#include <utility>
 
 #include "cli/version_text.h"
 #include "esvr/device_workers.h"
@@ -68,17 +69,18 @@ Parts::Parts(const Options& options, const Device& device, const CancelToken& ca
   store_.emplace(folder, originOf(options, device), accessOf(options.job, ranks));
 }
 
-PartRunner* Parts::runOn(const std::vector<Device>& devices) {
+PartRunner* Parts::runOn(const std::vector<Device>& devices, LostDevice onLost) {
   if (ranks_)
     runner_ = std::make_unique<RankWorkers>(*ranks_, devices, store_ ? &*store_ : nullptr);
   else if (!store_)
-    runner_ = std::make_unique<DeviceWorkers>(withPreparation(devices));
+    runner_ = std::make_unique<DeviceWorkers>(withPreparation(devices), std::move(onLost));
   else
     runner_ = std::make_unique<StoredParts>(
         *store_, StoredPartsOptions{.devices = withPreparation(devices),
                                     .share = options_.share,
                                     .mergeOnly = options_.job == Job::kMerge,
-                                    .cancel = &cancel_});
+                                    .cancel = &cancel_,
+                                    .onLost = std::move(onLost)});
   return runner_.get();
 }
 

@@ -29,7 +29,8 @@ class Parts {
   Parts(const Options& options, const Device& device, const CancelToken& cancel, Ranks* ranks);
 
   /// \param devices  the devices that fit parts; the runner is valid until the next call
-  [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices);
+  /// \param onLost   is told when one of several devices fails
+  [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices, LostDevice onLost);
 
   /// True if the parts are shared with the ranks of MPI, which must all do the same.
   [[nodiscard]] bool haveRanks() const { return ranks_ != nullptr; }

@@ -9,6 +9,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "cli/json_file.h"
 #include "cli/printable.h"
 
 namespace esvr::vdb2esvr {
@@ -51,7 +52,8 @@ std::string cut(std::string line, std::size_t width) {
 }
 
 std::string dumped(const nlohmann::ordered_json& json) {
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  constexpr int kOneLine = -1;
+  return cli::jsonText(json, kOneLine);
 }
 
 }  // namespace

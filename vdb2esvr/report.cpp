@@ -23,21 +23,25 @@ Json gridsOf(const RunRecord& record) {
   return grids;
 }
 
-Json toJson(const EsvrSummary& file, const ConvertedVector& vector) {
+/// The metrics of a vector that was not measured, because the run was interrupted, are missing.
+Json toJson(const RunRecord& record, const ConvertedVector& vector) {
   Json components = Json::array();
-  for (std::size_t c = 0; c < kComponents; ++c)
-    components.push_back({{"name", componentName(vector.uniqueName, c)},
-                          {"metrics", metricsJson(vector.metrics.components[c], std::nullopt)}});
-  return {{"name", vector.uniqueName},
-          {"value_type", vector.valueType},
-          {"bytes", ownBytes(file, vector)},
-          {"metrics", metricsJson(vector.metrics.magnitude, std::nullopt)},
-          {"components", std::move(components)}};
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    components.push_back({{"name", record.grids[vector.stored.first + c].uniqueName}});
+    if (vector.metrics)
+      components.back()["metrics"] = metricsJson(vector.metrics->components[c], std::nullopt);
+  }
+  Json json{{"name", vector.uniqueName},
+            {"value_type", vector.valueType},
+            {"bytes", ownBytes(record.output, vector)}};
+  if (vector.metrics) json["metrics"] = metricsJson(vector.metrics->magnitude, std::nullopt);
+  json["components"] = std::move(components);
+  return json;
 }
 
 Json vectorsOf(const RunRecord& record) {
   Json vectors = Json::array();
-  for (const auto& vector : record.vectors) vectors.push_back(toJson(record.output, vector));
+  for (const auto& vector : record.vectors) vectors.push_back(toJson(record, vector));
   return vectors;
 }
 

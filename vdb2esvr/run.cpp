@@ -32,9 +32,7 @@ namespace esvr::vdb2esvr {
 namespace {
 
 void checkFiles(const Options& options) {
-  std::vector<std::filesystem::path> files{options.input, options.output};
-  if (reportIsFile(options)) files.emplace_back(options.report);
-  cli::requireDistinct(files);
+  cli::requireSeparate(options.inputs.paths, {options.output, options.report});
   const bool mayExist = options.overwrite || options.job == Job::kPart;  // it is not written
   cli::checkOutput(options.output, {".esvr"}, mayExist);
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
@@ -52,16 +50,22 @@ void tellDevices(const std::vector<Device>& devices, const Options& options, con
 
 void tellNothingFitted(const GridChoice& choice, const cli::Log& log) {
   if (!choice.fitted.empty()) return;
+  if (choice.carried.empty())
+    return log.warning("the file has no grid; the output has its metadata only");
   log.warning("no grid is fitted; the output has carried grids only",
               std::to_string(choice.carried.size()) + " of " +
                   std::to_string(choice.carried.size() + choice.skipped.size()) +
                   " grids are carried unchanged");
 }
 
-void tellGrid(const ConvertedGrid& grid, const cli::Log& log) {
+void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log& log) {
+  const std::string replacement = options.read.nonFinite == NonFinite::kBackground
+                                      ? "the background"
+                                      : cli::shortNumber(options.read.nonFiniteValue);
   if (grid.nonFiniteReplaced > 0)
-    log.warning("grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by 0",
-                std::to_string(grid.nonFiniteReplaced) + " voxels");
+    log.warning(
+        "grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by " + replacement,
+        std::to_string(grid.nonFiniteReplaced) + " voxels");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
     log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full",
                 std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
@@ -97,17 +101,20 @@ class FileConversion {
     ByteShares shares(options_, record.input, grids, twins, carried);
     for (std::size_t g = 0; g < grids.size(); ++g) {
       if (cancelled())
-        record.notFitted.push_back(grids[g].uniqueName());
+        record.notFitted.push_back(grids[g].uniqueName);
       else if (const auto twin = twins.find(g); twin != twins.end())
         record.grids.push_back(twinOf(record.grids[twin->second.of], grids[g], twin->second));
       else if (!convert(g, grids[g], shares, record))
-        record.notFitted.push_back(grids[g].uniqueName());
+        record.notFitted.push_back(grids[g].uniqueName);
     }
     collectVectors(record);
     record.interrupted = cancelled();
     if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
   }
+
+  /// The device of fits, which is another one if the first has failed.
+  [[nodiscard]] const Device& device() const { return options_.convert.fit.device; }
 
  private:
   [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
@@ -119,14 +126,22 @@ class FileConversion {
            ", and the same command continues";
   }
 
-  void runOn(const std::vector<Device>& devices) {
-    options_.convert.fit.device = devices.front();
-    options_.convert.fit.parts = parts_.runOn(devices);
+  void runOn(std::vector<Device> devices) {
+    devices_ = std::move(devices);
+    options_.convert.fit.device = devices_.front();
+    options_.convert.fit.parts =
+        parts_.runOn(devices_, [this](const Device& device, const std::string& why) {
+          tellLost(device, why, "the other devices go on");
+        });
+  }
+
+  void tellLost(const Device& device, const std::string& why, const std::string& next) const {
+    log_.warning(deviceName(device) + " is not used any more: " + why + "; " + next);
   }
 
   /// \return false if the run was interrupted before the fit had a result
   bool convert(std::size_t g, const FittedGrid& fitted, ByteShares& shares, RunRecord& record) try {
-    ProgressBar bar(fitted.uniqueName(), options_.progress, options_.verbosity);
+    ProgressBar bar(fitted.uniqueName, options_.progress, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
     record.grids.push_back(convertToShare(g, fitted, shares));
     return true;
@@ -140,44 +155,57 @@ class FileConversion {
   ConvertedGrid convertToShare(std::size_t g, const FittedGrid& fitted, ByteShares& shares) {
     std::optional<std::uint64_t> bytes = shares.of(g);
     ConvertedGrid grid = convertWhereItFits(fitted, bytes);
-    while (const std::uint64_t excess = shares.take(g, grid.stored())) {
-      if (cancelled()) break;
+    const auto excessOf = [&]() -> std::uint64_t {
+      const BestSoFar completion;
+      return cancelled() ? 0 : shares.take(g, grid.stored());  // no grid follows an interrupted one
+    };
+    while (const std::uint64_t excess = excessOf()) {
       bytes = *bytes - std::min(*bytes, excess);
       grid = convertWhereItFits(fitted, bytes);
     }
     return grid;
   }
 
-  /// Converts a grid. If the GPU that "auto" selected fails, for example because its memory is too
-  /// small, the CPU converts this grid and all later ones.
+  /// Converts a grid. If a device fails, for example because its memory is full, the next one of
+  /// several, or the CPU in place of the GPU that "auto" selected, converts this grid and all later ones.
   ConvertedGrid convertWhereItFits(const FittedGrid& fitted, std::optional<std::uint64_t> bytes) {
-    const bool onGpu = options_.convert.fit.device.kind == DeviceKind::kCuda;
-    if (options_.device != kAuto || !onGpu || parts_.haveRanks())
-      return convertGrid(options_, fitted, bytes);
-    try {
-      return convertGrid(options_, fitted, bytes);
-    } catch (const DeviceError& error) {
-      log_.warning(std::string(error.what()) + "; continuing on the CPU");
-      runOn({Device{}});
-      return convertGrid(options_, fitted, bytes);
+    for (;;) {
+      try {
+        return convertGrid(options_, fitted, bytes);
+      } catch (const DeviceError& error) {
+        if (!replaceDevice(error)) throw;
+      }
     }
+  }
+
+  /// \return false if there is no device to go on with
+  bool replaceDevice(const DeviceError& error) {
+    const Device failed = device();
+    if (parts_.haveRanks() || failed.kind == DeviceKind::kCpu) return false;
+    std::vector<Device> left = devices_;
+    std::erase(left, failed);
+    const bool toCpu = left.empty() && options_.device == kAuto;
+    if (toCpu) left = {Device{}};
+    if (left.empty()) return false;
+    tellLost(failed, error.what(),
+             toCpu ? "continuing on the CPU" : "continuing on " + deviceName(left.front()));
+    runOn(std::move(left));
+    return true;
   }
 
   Options options_;
   Parts& parts_;
   const cli::Log& log_;
-  std::future<void> started_;  ///< the device starts while the first grid is read; may be empty
+  std::vector<Device> devices_;  ///< those that have not failed
+  std::future<void> started_;    ///< the device starts while the first grid is read; may be empty
 };
 
 /// Gives the carried grids their places among those that the file holds.
 void placeCarried(const RunRecord& record, std::vector<CarriedGrid>& carried) {
-  const auto& names = record.input.grids;
-  std::size_t source = 0, converted = 0;
+  std::size_t converted = 0;
   for (std::size_t c = 0; c < carried.size(); ++c) {
-    for (; source < carried[c].place; ++source)
-      while (converted < record.grids.size() &&
-             names[source].uniqueName == record.grids[converted].sourceName)
-        ++converted;
+    while (converted < record.grids.size() && record.grids[converted].id.place < carried[c].place)
+      ++converted;
     carried[c].place = std::uint32_t(converted + c);
   }
 }
@@ -193,12 +221,20 @@ EsvrFile assemble(std::vector<CarriedGrid> carried, const RunRecord& record) {
   return file;
 }
 
+/// The file, after vectors that are smaller unchanged were carried. An interrupted run tries none.
+EsvrFile carriedAndConverted(const Options& options, std::vector<CarriedGrid> carried,
+                             RunRecord& record) {
+  const Completion completion;
+  if (!record.interrupted) carrySmallerVectors(options, record, carried);
+  return assemble(std::move(carried), record);
+}
+
 void store(const Options& options, const EsvrFile& file, const StoreFile& store,
            RunRecord& record) {
   cli::Stopwatch watch;
   record.output = store(file);
   record.secondsWrite = watch.lap();
-  measureVectors(options, file, record);
+  if (!record.interrupted) measureVectors(options, file, record);
 }
 
 void tellResult(const Options& options, const RunRecord& record) {
@@ -263,10 +299,9 @@ Options besides(const std::vector<CarriedGrid>& carried, Options options) {
 }
 
 /// The options of conversions after the fits.
-Options optionsOfFits(Options options, const CancelToken& cancel,
-                      const std::vector<Device>& devices) {
+Options optionsOfFits(Options options, const CancelToken& cancel, const Device& device) {
   options.convert.fit.cancel = &cancel;
-  options.convert.fit.device = devices.front();
+  options.convert.fit.device = device;
   return options;
 }
 
@@ -275,6 +310,12 @@ Options optionsOfFits(Options options, const CancelToken& cancel,
 bool mayFit(const Options& options) {
   return !std::holds_alternative<LosslessGoal>(options.convert.goal) &&
          options.convert.representation != Representation::kVoxels;
+}
+
+GridChoice chooseFor(Options& options, const VdbSummary& input) {
+  if (input.grids.empty() && options.sequence) return {};
+  resolveNames(input, options);
+  return chooseGrids(options.input, input, options.grids);
 }
 
 StoreFile writingTo(const Options& options) {
@@ -290,31 +331,37 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   const cli::Log& log = run.log;
   cli::Stopwatch watch;
   RunRecord record;
+  const cli::WatchedInputs watched({given.input});
+  const CancelScope scope(&cancel);
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
   Options options = given;
-  resolveNames(record.input, options);
-  GridChoice choice = chooseGrids(options.input, record.input, options.grids);
+  GridChoice choice = chooseFor(options, record.input);
+  carryInactiveValues(
+      options, [&](std::string text) { log.warning(std::move(text)); }, choice);
   tellNothingFitted(choice, log);
   std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
   record.carried = std::move(choice.carried);
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
-  findPeaks(besides(carried, options), choice.fitted);
+  findScales(besides(carried, options), choice.fitted);
   Parts parts(options, selected.front(), cancel, ranks);
-  FileConversion(besides(carried, options), selected, cancel, parts, log)
-      .run(choice.fitted, carried, record);
-  for (const auto& grid : record.grids) tellGrid(grid, log);
+  FileConversion conversion(besides(carried, options), selected, cancel, parts, log);
+  conversion.run(choice.fitted, carried, record);
+  for (const auto& grid : record.grids) tellGrid(options, grid, log);
   if (options.job == Job::kPart) {
     if (!ranks) tellPart(options, record, log);
     return record;
   }
-  carrySmallerVectors(options, record, carried);
-  EsvrFile file = assemble(std::move(carried), record);
-  shareGrids(optionsOfFits(options, cancel, selected), choice.fitted, file, record);
+  EsvrFile file = carriedAndConverted(options, std::move(carried), record);
+  shareGrids(optionsOfFits(options, cancel, conversion.device()), choice.fitted, file, record);
+  const bool isShared = file.layout == FileLayout::kCompact;
+  if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
+  watched.requireUnchanged();  // the grids were read one after the other
+  const Completion completion;
   store(options, file, run.store, record);
-  if (file.layout == FileLayout::kCompact) record.bytesSeparate = bytesWithoutSharing(file, record);
+  if (isShared) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;
@@ -347,13 +394,31 @@ Options optionsOf(const Options& options, const Ranks* ranks) {
   return own;
 }
 
+/// Open MPI kills the ranks a second after it has told them to end.
+void tellWhatSurvives(const Options& options, const cli::Log& log) {
+  if (keepsParts(options))
+    return log.info("if MPI ends this run early, its finished parts stay in " +
+                    partsFolder(options).string() + ", and the same command continues");
+  log.info(
+      "if MPI ends this run early, the best result so far is written if that takes less than the "
+      "second that Open MPI leaves (OMPI_MCA_odls_base_sigkill_timeout=10 leaves 10); --resume "
+      "keeps "
+      "the finished parts in any case");
+}
+
 int runAs(const Options& options, Ranks* ranks) {
   const cli::Log log(kProgram, options.verbosity);
   const cli::ThreadLimit threads(options.threads);
-  const cli::Interrupts interrupts;
+  cli::Interrupts interrupts(ranks ? cli::FurtherSignals::kAreIgnored
+                                   : cli::FurtherSignals::kEndAtOnce);
+  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
   checkFiles(options);
+  if (ranks) tellWhatSurvives(options, log);
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);
-  if (options.job == Job::kPart) return 0;
+  if (options.job == Job::kPart) {
+    if (ranks && record.interrupted) throw RuntimeFailure("interrupted");  // as rank 0 does
+    return 0;
+  }
   tellResult(options, record);
   throwWhatIsAmiss(options, record);
   return 0;

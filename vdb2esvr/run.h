@@ -15,6 +15,12 @@ namespace esvr::vdb2esvr {
 /// False if the options exclude ellipsoids, so that no device is needed.
 [[nodiscard]] bool mayFit(const Options& options);
 
+/// Finds the grids that options name, and chooses those that are fitted, carried and left out. A file
+/// without grids is a valid frame of a sequence even if options name grids, because simulations often
+/// begin so.
+/// \throws BadInput, UsageError  as for resolveNames and chooseGrids
+[[nodiscard]] GridChoice chooseFor(Options& options, const VdbSummary& input);
+
 /// Stores the converted file and returns a summary of its sections.
 using StoreFile = std::function<EsvrSummary(const EsvrFile&)>;
 

@@ -1,6 +1,7 @@
 #include "vdb2esvr/run_record.h"
 
 #include <algorithm>
+#include <set>
 
 #include "cli/names.h"
 #include "esvr/error.h"
@@ -38,12 +39,9 @@ Ratio ratioOf(const RunRecord& record) {
     ratio.bytesIn = record.input.fileBytes;
     return ratio;
   }
-  const auto isConverted = [&](const GridSummary& summary) {
-    return std::any_of(record.grids.begin(), record.grids.end(),
-                       [&](const auto& grid) { return grid.sourceName == summary.uniqueName; });
-  };
-  for (const GridSummary& grid : record.input.grids)
-    if (isConverted(grid)) ratio.bytesIn += grid.storedBytes;
+  std::set<std::size_t> places;  // components share the place of their grid
+  for (const ConvertedGrid& grid : record.grids) places.insert(grid.id.place);
+  for (const std::size_t place : places) ratio.bytesIn += record.input.grids[place].storedBytes;
   for (const NotFitted& carried : record.carried) ratio.bytesIn += carried.grid.storedBytes;
   return ratio;
 }

@@ -16,10 +16,11 @@ namespace esvr::vdb2esvr {
 
 /// A grid of vectors, whose components are three of the converted grids.
 struct ConvertedVector {
-  std::string uniqueName;  ///< name in the input
-  std::string valueType;   ///< OpenVDB's name in the input: "vec3s" or "vec3d"
-  StoredVector stored;     ///< its first component is an index of RunRecord::grids
-  VectorMetrics metrics{};
+  std::string uniqueName;                  ///< name in the input
+  std::size_t place = 0;                   ///< place in the input
+  std::string valueType;                   ///< OpenVDB's name in the input: "vec3s" or "vec3d"
+  StoredVector stored;                     ///< its first component is an index of RunRecord::grids
+  std::optional<VectorMetrics> metrics{};  ///< nothing if the run was interrupted
 };
 
 struct RunRecord {

@@ -12,6 +12,7 @@
 #include "cli/json_file.h"
 #include "cli/output.h"
 #include "cli/thread_limit.h"
+#include "esvr/sequence_file.h"
 #include "vdb2esvr/convert_groups.h"
 #include "vdb2esvr/frame_conversion.h"
 #include "vdb2esvr/report.h"
@@ -63,7 +64,6 @@ class SequenceConversion {
   void convert(FrameRecord& record, int worker) {
     if (keep(record)) return;
     const Options own = conversion_.optionsOf(record.frame, worker);
-    const cli::FrameFolder folder(own.output);
     conversion_.convert(own, record, writingTo(own));
   }
 
@@ -92,10 +92,13 @@ class SequenceConversion {
 
 SequenceRecord convertFrames(const Options& options, const CancelToken& cancel) {
   const cli::Sequence& sequence = *options.sequence;
-  const auto frames = cli::planFrames(sequence);
+  const auto frames = cli::planFrames(sequence, cli::Log(kProgram, options.verbosity));
   const bool isOneFile = sequence.output.isWhole();
   const bool mayExist = options.overwrite || (options.resume && !isOneFile);
-  cli::checkFrameOutputs(sequence, frames, {{".esvr"}, mayExist});
+  std::vector<std::filesystem::path> more{options.report};
+  if (isOneFile) more.push_back(SequenceWriter::partialPath(options.output));
+  cli::checkFrameOutputs(sequence, frames,
+                         {.extensions = {".esvr"}, .mayExist = mayExist, .moreOutputs = more});
   return isOneFile ? convertGroups(options, frames, cancel)
                    : SequenceConversion(options, frames, cancel).run();
 }
@@ -103,6 +106,8 @@ SequenceRecord convertFrames(const Options& options, const CancelToken& cancel) 
 /// Converts the frames; if nothing can be converted, writes a report of the failure.
 SequenceRecord convertFramesOrReport(const Options& options, const CancelToken& cancel) try {
   return convertFrames(options, cancel);
+} catch (const UsageError&) {
+  throw;  // the report itself may be one of the files that must not be written
 } catch (const Error& error) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeFailureReport(options, error));
@@ -124,7 +129,9 @@ int runSequence(const Options& options, const Ranks* ranks) {
         "the ranks of MPI fit the chunks of one volume; give each process some frames of the "
         "sequence (--frames)");
   const cli::ThreadLimit threads(options.threads);
-  const cli::Interrupts interrupts;
+  cli::Interrupts interrupts;
+  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
+  cli::requireSeparate(cli::filesOfInput(options.input.string()), {options.report});
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
   const SequenceRecord record = convertFramesOrReport(options, interrupts.token());
   tellSequence(options, record);

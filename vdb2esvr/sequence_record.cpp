@@ -1,6 +1,7 @@
 #include "vdb2esvr/sequence_record.h"
 
 #include <algorithm>
+#include <unordered_map>
 
 #include "cli/frame_messages.h"
 
@@ -10,12 +11,6 @@ namespace {
 bool isWritten(const FrameRecord& frame) {
   return frame.state == FrameState::kConverted || frame.state == FrameState::kHeld ||
          frame.state == FrameState::kKept;
-}
-
-GridRange& rangeOf(const std::string& name, std::vector<GridRange>& ranges) {
-  const auto known = std::ranges::find(ranges, name, &GridRange::name);
-  if (known != ranges.end()) return *known;
-  return ranges.emplace_back(GridRange{.name = name});
 }
 
 void widen(const FrameGrid& grid, GridRange& range) {
@@ -78,8 +73,13 @@ std::vector<cli::FrameNumber> framesIn(FrameState state, const SequenceRecord& r
 
 std::vector<GridRange> gridRanges(const SequenceRecord& record) {
   std::vector<GridRange> ranges;
+  std::unordered_map<std::string, std::size_t> places;
   for (const FrameRecord& frame : record.frames)
-    for (const FrameGrid& grid : frame.grids) widen(grid, rangeOf(grid.name, ranges));
+    for (const FrameGrid& grid : frame.grids) {
+      const auto [place, isNew] = places.emplace(grid.name, ranges.size());
+      if (isNew) ranges.push_back({.name = grid.name});
+      widen(grid, ranges[place->second]);
+    }
   return ranges;
 }
 

@@ -18,8 +18,8 @@ std::string stateOf(const SequenceRecord& record, const FrameRecord& frame) {
   return "held from " + std::to_string(record.frames[*frame.frame.holds].frame.number);
 }
 
-/// True for a frame that this run converted.
-bool hasFigures(const FrameRecord& frame) { return !frame.grids.empty() || !frame.carried.empty(); }
+/// True for a frame that this run converted, which may have no grid.
+bool hasFigures(const FrameRecord& frame) { return frame.bytesIn > 0; }
 
 /// The smallest value of the fitted grids of a frame as text.
 std::string lowest(const FrameRecord& frame, double FrameGrid::*psnr) {
@@ -40,8 +40,8 @@ std::vector<std::string> rowOf(const SequenceRecord& record, const FrameRecord& 
           std::to_string(frame.carried.size()),
           std::to_string(ellipsoids),
           std::to_string(frame.bytesOut),
-          lowest(frame, &FrameGrid::psnrBox),
           lowest(frame, &FrameGrid::psnrActive),
+          lowest(frame, &FrameGrid::psnrBox),
           cli::seconds(frame.seconds),
           state};
 }
@@ -111,7 +111,7 @@ void printBytes(const Options& options, const SequenceRecord& record, std::ostre
 }  // namespace
 
 void printSequence(const Options& options, const SequenceRecord& record, std::ostream& out) {
-  cli::Table table({"frame", "fitted", "carried", "ellipsoids", "bytes", "PSNR box", "active",
+  cli::Table table({"frame", "fitted", "carried", "ellipsoids", "bytes", "PSNR active", "PSNR box",
                     "seconds", "state"});
   for (const FrameRecord& frame : record.frames) table.add(rowOf(record, frame));
   table.print(out);

@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "cli/stopwatch.h"
+#include "esvr/error.h"
 #include "esvr/voxel_reference.h"
 
 namespace esvr::vdb2esvr {
@@ -28,7 +29,7 @@ class Sharing {
 
   void run() {
     for (std::size_t g = 0; g < record_.grids.size() && !isCancelled(); ++g)
-      if (mayShare(g)) share(g);
+      if (mayShare(g)) shareUnlessCancelled(g);
   }
 
  private:
@@ -38,11 +39,11 @@ class Sharing {
 
   /// True if a grid holds voxels of its own, and the options let it share.
   [[nodiscard]] bool mayShare(std::size_t g) const {
-    const auto& names = options_.sharing.names;
+    const auto& places = options_.sharing.places;
     const ConvertedGrid& grid = record_.grids[g];
-    const bool isNamed = names.empty() || std::ranges::count(names, grid.sourceName) > 0;
+    const bool isNamed = places.empty() || places.contains(grid.id.place);
     const auto& voxels = file_.grids[g].voxels;
-    return isNamed && !grid.sameAs && voxels && voxels->codes.size() <= kMostShared;
+    return isNamed && !grid.twinOf && voxels && voxels->codes.size() <= kMostShared;
   }
 
   [[nodiscard]] std::vector<std::size_t> candidatesFor(std::size_t g) const {
@@ -52,6 +53,17 @@ class Sharing {
       if (mayShare(other) && file_.grids[other].descriptor.transform == transform)
         candidates.push_back(other);
     return candidates;
+  }
+
+  /// A grid whose sharing is cancelled stands alone.
+  void shareUnlessCancelled(std::size_t g) {
+    try {
+      CancelScope::check();
+      share(g);
+    } catch (const Cancelled&) {
+      file_.grids[g] = converted(g).stored();
+      converted(g).shared.reset();
+    }
   }
 
   void share(std::size_t g) {
@@ -105,13 +117,13 @@ class Sharing {
   }
 
   [[nodiscard]] const FittedGrid& fittedOf(std::size_t g) const {
-    return *std::ranges::find(fitted_, converted(g).uniqueName, &FittedGrid::uniqueName);
+    return *std::ranges::find(fitted_, converted(g).id, &FittedGrid::id);
   }
 
   /// Gives the twins of a grid its voxels.
   void copyToTwins(std::size_t g) {
     for (std::size_t t = g + 1; t < record_.grids.size(); ++t) {
-      if (converted(t).sameAs != converted(g).uniqueName) continue;
+      if (converted(t).twinOf != converted(g).id) continue;
       const GridDescriptor descriptor = file_.grids[t].descriptor;
       file_.grids[t] = file_.grids[g];
       file_.grids[t].descriptor = descriptor;
@@ -160,7 +172,7 @@ std::uint64_t bytesWithoutSharing(const EsvrFile& file, const RunRecord& record)
   if (areJoined)
     for (const StoredGrid& grid : file.grids) bytes += bytesOfRecord(grid);
   for (const ConvertedGrid& grid : record.grids)
-    if (grid.shared && !grid.sameAs) bytes += grid.shared->bytesWithout - grid.shared->bytesWith;
+    if (grid.shared && !grid.twinOf) bytes += grid.shared->bytesWithout - grid.shared->bytesWith;
   return bytes;
 }
 

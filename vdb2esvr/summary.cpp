@@ -1,10 +1,12 @@
 #include "vdb2esvr/summary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 
 #include "cli/names.h"
 #include "cli/printable.h"
+#include "cli/shell_word.h"
 #include "cli/table.h"
 
 namespace esvr::vdb2esvr {
@@ -76,6 +78,18 @@ void printSurface(const ConvertedGrid& grid, std::ostream& out) {
       << grid.surface->signs.voxels << " voxels change sign\n";
 }
 
+/// Says which values of inactive voxels the file does not hold, and how to keep them.
+void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostream& out) {
+  if (grid.inactive.count() == 0) return;
+  out << cli::printable(grid.uniqueName) << ": gives up " << toText(grid.inactive);
+  const auto source =
+      std::ranges::find(record.input.grids, grid.sourceName, &GridSummary::uniqueName);
+  if (source != record.input.grids.end() && source->whyNotCarried.empty())
+    out << "; --lossless or --keep " << cli::printable(cli::shellWord(grid.sourceName))
+        << " keeps them";
+  out << '\n';
+}
+
 /// Says how the data of a grid were made.
 void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
   const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
@@ -87,18 +101,18 @@ void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& 
   if (grid.psnrBetween)
     out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
         << cli::decibels(*grid.psnrBetween) << " dB\n";
-  if (!grid.sameAs) {
+  if (!grid.twinOf) {
     printRemark(grid, out);
     return printChoice(grid, out);
   }
-  out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(*grid.sameAs)
+  out << cli::printable(grid.uniqueName) << ": stored once with " << cli::printable(grid.sameAs)
       << ", which has the same voxels\n";
 }
 
 /// Says which grids the voxels of others refer to, and what that saved.
 void printShared(const RunRecord& record, std::ostream& out) {
   for (const ConvertedGrid& grid : record.grids)
-    if (grid.shared && !grid.shared->with.empty() && !grid.sameAs)
+    if (grid.shared && !grid.shared->with.empty() && !grid.twinOf)
       out << cli::printable(grid.uniqueName) << ": refers to " << cli::printable(grid.shared->with)
           << ", with " << grid.shared->bytesWith << " bytes rather than "
           << grid.shared->bytesWithout << '\n';
@@ -111,20 +125,22 @@ void printShared(const RunRecord& record, std::ostream& out) {
 
 void printFitted(const Options& options, const RunRecord& record, std::ostream& out) {
   if (record.grids.empty()) return;
-  cli::Table table({"grid", "ellipsoids", "bytes", "PSNR box", "active", "max error", "seconds"});
+  cli::Table table(
+      {"grid", "ellipsoids", "bytes", "PSNR active", "PSNR box", "max error", "seconds"});
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
     table.add({grid.uniqueName, std::to_string(grid.stored().field.ellipsoidCount()),
-               std::to_string(cli::ownBytes(record.output, g)), cli::decibels(grid.metrics.psnrBox),
-               cli::decibels(grid.metrics.psnrActive), cli::shortNumber(grid.metrics.maxError),
-               cli::seconds(grid.seconds.total())});
+               std::to_string(cli::ownBytes(record.output, g)),
+               cli::decibels(grid.metrics.psnrActive), cli::decibels(grid.metrics.psnrBox),
+               cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});
   }
   table.print(out);
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
-    if (!record.grids[g].sameAs) {
+    if (!record.grids[g].twinOf) {
       printTopology(record, g, out);
       printOverlap(options, record.grids[g], out);
     }
+    printInactive(record, record.grids[g], out);
     printNote(options, record.grids[g], out);
   }
 }
@@ -132,11 +148,12 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
 /// Lists the errors of the vectors. The table of fitted grids has their components.
 void printVectors(const RunRecord& record, std::ostream& out) {
   if (record.vectors.empty()) return;
-  cli::Table table({"vectors", "values", "bytes", "PSNR box", "active", "max error"});
+  cli::Table table({"vectors", "values", "bytes", "PSNR active", "PSNR box", "max error"});
   for (const ConvertedVector& vector : record.vectors) {
-    const VolumeMetrics& m = vector.metrics.magnitude;
+    if (!vector.metrics) continue;  // the run was interrupted
+    const VolumeMetrics& m = vector.metrics->magnitude;
     table.add({vector.uniqueName, vector.valueType, std::to_string(ownBytes(record.output, vector)),
-               cli::decibels(m.psnrBox), cli::decibels(m.psnrActive),
+               cli::decibels(m.psnrActive), cli::decibels(m.psnrBox),
                cli::shortNumber(m.maxError)});
   }
   table.print(out);

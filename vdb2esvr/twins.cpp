@@ -31,19 +31,21 @@ class TwinSearch {
 
   void read(std::size_t index, const FittedGrid& fitted) {
     cli::Stopwatch watch;
-    VolumeGrid grid = readSource(options_, fitted);
-    const Key key{keyOf({grid.descriptor, grid.volume}), fitted.peak, ownGoalOf(options_, fitted)};
+    VolumeGrid grid = sayingTheWayOut(fitted, [&] { return readSource(options_, fitted); });
+    const Key key{keyOf({grid.descriptor, grid.volume}), fitted.peak, fitted.range,
+                  ownGoalOf(options_, fitted)};
     const auto [first, isNew] = firstBy_.emplace(key, index);
     if (isNew) return;
     twins_[index] = {first->second, std::move(grid.descriptor), grid.nonFiniteReplaced,
-                     watch.lap()};
+                     grid.inactive, watch.lap()};
   }
 
   [[nodiscard]] Twins take() { return std::move(twins_); }
 
  private:
-  /// Volume, peak, and index of the goal.
-  using Key = std::tuple<InputKey, std::optional<double>, std::optional<std::size_t>>;
+  /// Volume, peak, range, and index of the goal.
+  using Key = std::tuple<InputKey, std::optional<double>, std::optional<double>,
+                         std::optional<std::size_t>>;
 
   const Options& options_;
   std::map<Key, std::size_t> firstBy_;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/options.h"
 
@@ -17,6 +18,7 @@ struct Twin {
   std::size_t of = 0;  ///< index of the first grid with these voxels
   GridDescriptor descriptor;
   std::uint64_t nonFiniteReplaced = 0;
+  InactiveValues inactive{};
   double secondsRead = 0.0;
 };
 
@@ -24,7 +26,7 @@ struct Twin {
 using Twins = std::map<std::size_t, Twin>;
 
 /// Reads the grids whose numbers and boxes of active voxels are the same, one after the other.
-/// Twins have the same peak of the PSNR and the same goal. It ends early if the run is interrupted.
+/// Twins have the same peak of the PSNR, the same range and the same goal. It ends early if the run is interrupted.
 [[nodiscard]] Twins findTwins(const Options& options, const std::vector<FittedGrid>& grids);
 
 }  // namespace esvr::vdb2esvr

@@ -11,16 +11,9 @@ namespace {
 
 using Grids = std::vector<ConvertedGrid>;
 
-/// The place of a grid in the input.
-std::size_t placeOf(const RunRecord& record, const std::string& uniqueName) {
-  const auto& grids = record.input.grids;
-  return std::size_t(std::ranges::find(grids, uniqueName, &GridSummary::uniqueName) -
-                     grids.begin());
-}
-
 bool isComplete(const Grids& grids, std::size_t first) {
   return grids.size() - first >= kComponents &&
-         grids[first].sourceName == grids[first + kComponents - 1].sourceName;
+         grids[first].id.place == grids[first + kComponents - 1].id.place;
 }
 
 /// The grids that are not of numbers, by their first components.
@@ -28,19 +21,18 @@ std::vector<ConvertedVector> listVectors(const RunRecord& record) {
   std::vector<ConvertedVector> vectors;
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
-    if (grid.component != std::size_t{0}) continue;
-    const GridSummary& source = record.input.grids[placeOf(record, grid.sourceName)];
-    vectors.push_back({source.uniqueName, source.valueType, {source.name, g}});
+    if (grid.id.component != std::size_t{0}) continue;
+    const GridSummary& source = record.input.grids[grid.id.place];
+    vectors.push_back({source.uniqueName, grid.id.place, source.valueType, {source.name, g}});
   }
   return vectors;
 }
 
 /// Removes a vector from the converted grids. Its components are no longer twins of other grids.
-void removeVector(const std::string& uniqueName, RunRecord& record) {
-  std::erase_if(record.grids, [&](const auto& grid) { return grid.sourceName == uniqueName; });
+void removeVector(std::size_t place, RunRecord& record) {
+  std::erase_if(record.grids, [&](const auto& grid) { return grid.id.place == place; });
   for (ConvertedGrid& grid : record.grids)
-    for (std::size_t c = 0; c < kComponents; ++c)
-      if (grid.sameAs == componentName(uniqueName, c)) grid.sameAs.reset();
+    if (grid.twinOf && grid.twinOf->place == place) grid.twinOf.reset();
   record.vectors = listVectors(record);
 }
 
@@ -71,7 +63,7 @@ void insertCarried(const NotFitted& left, CarriedGrid grid, RunRecord& record,
 
 void collectVectors(RunRecord& record) {
   for (std::size_t g = 0; g < record.grids.size(); ++g)
-    if (record.grids[g].component == std::size_t{0} && !isComplete(record.grids, g))
+    if (record.grids[g].id.component == std::size_t{0} && !isComplete(record.grids, g))
       record.grids.resize(g);
   record.vectors = listVectors(record);
 }
@@ -81,21 +73,21 @@ void carrySmallerVectors(const Options& options, RunRecord& record,
   if (!mayCarry(options)) return;
   const auto vectors = record.vectors;
   for (const ConvertedVector& vector : vectors) {
-    const std::size_t place = placeOf(record, vector.uniqueName);
+    const std::size_t place = vector.place;
     const GridSummary& source = record.input.grids[place];
     if (!source.whyNotCarried.empty()) continue;
     auto unchanged = readCarried(options.input, std::span(&place, 1), options.read);
     const std::uint64_t bytes = bytesAddedBy(record, vector);
     if (bytesOfCarried(unchanged) >= bytes) continue;
     const std::string why = "its components would take " + std::to_string(bytes) + " bytes";
-    removeVector(vector.uniqueName, record);
+    removeVector(place, record);
     insertCarried({source, place, why}, std::move(unchanged.front()), record, carried);
   }
 }
 
 void measureVectors(const Options& options, const EsvrFile& file, RunRecord& record) {
   for (ConvertedVector& vector : record.vectors) {
-    const VectorGrid source = readVector(options.input, vector.uniqueName, options.read);
+    const VectorGrid source = readVector(options.input, vector.place, options.read);
     const VectorGrid decoded = decodeVector(vector.stored.name, componentsOf(file, vector.stored),
                                             {.memory = options.read.memory});
     vector.metrics =

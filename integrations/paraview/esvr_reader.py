@@ -15,6 +15,7 @@ from vtkmodules.vtkCommonMath import vtkMatrix3x3
 import esvr
 
 
+EMPTY = (0, -1, 0, -1, 0, -1)  # the extent of VTK without any point
 NOWHERE = ((0, 0, 0), (0, 0, 0))  # a box whose grids have hardly any ellipsoids, but all their properties
 
 
@@ -93,6 +94,17 @@ class ESVRReader(VTKPythonAlgorithmBase):
             return esvr.read(self._path, frame=frame)
         return esvr.read(self._path, box=box, ellipsoids=self._ellipsoids or None)
 
+    def _described(self, info):
+        """What the frame at the time holds, or the first one with something active: the first frames of a simulation
+        may be without grids."""
+        at = self._frame_at(info)
+        file = self._read(at, NOWHERE)
+        for frame in self._frames:
+            if any(grid.box for grid in file.grids):
+                break
+            file = self._read(frame, NOWHERE)
+        return file
+
     def _offer(self, names):
         """Offers the grids of a file; those of a new file are all chosen."""
         if self._known == (self._path, names):
@@ -103,23 +115,33 @@ class ESVRReader(VTKPythonAlgorithmBase):
             self._selection.AddArray(name)
 
     def _chosen(self, file):
-        """The chosen grids that have the transform of the first one."""
-        chosen = [grid for grid in file.grids if self._selection.ArrayIsEnabled(grid.name) and grid.box]
-        if not chosen:
+        """The names and the chosen grids that have the transform of the first one.
+
+        The names are those of esvr.File.names, which are unique. A frame of a sequence may have nothing active.
+        """
+        named = list(zip(file.names, file.grids))
+        chosen = [(name, grid) for name, grid in named if self._selection.ArrayIsEnabled(name) and grid.box]
+        if not chosen and not self._frames:
             raise RuntimeError(f"{self._path}: no grid with active voxels is chosen")
-        for grid in chosen:
-            if not placed_alike(grid, chosen[0]):
-                print(f"{self._path}: grid '{grid.name}' has another transform than '{chosen[0].name}' and is left out")
-        return [grid for grid in chosen if placed_alike(grid, chosen[0])]
+        for name, grid in chosen:
+            if not placed_alike(grid, chosen[0][1]):
+                print(f"{self._path}: grid '{name}' has another transform than '{chosen[0][0]}' and is left out")
+        return [(name, grid) for name, grid in chosen if placed_alike(grid, chosen[0][1])]
 
     def RequestInformation(self, request, inputs, outputs):
         if not self._path:
             return 1
         info = outputs.GetInformationObject(0)
         self._frames = esvr.frames(self._path)
-        file = self._read(self._frame_at(info), NOWHERE)
-        self._offer(tuple(dict.fromkeys(grid.name for grid in file.grids)))
-        grids = self._chosen(file)
+        file = self._described(info)
+        self._offer(tuple(file.names))
+        grids = [grid for _, grid in self._chosen(file)]
+        if self._frames:
+            info.Set(Pipeline.TIME_STEPS(), [float(f) for f in self._frames], len(self._frames))
+            info.Set(Pipeline.TIME_RANGE(), [float(self._frames[0]), float(self._frames[-1])], 2)
+        if not grids:
+            info.Set(Pipeline.WHOLE_EXTENT(), EMPTY, 6)
+            return 1
         boxes = np.array([grid.box for grid in grids])
         info.Set(Pipeline.WHOLE_EXTENT(), extent_of((boxes[:, 0].min(0).tolist(), boxes[:, 1].max(0).tolist())), 6)
         origin, spacing, directions = geometry_of(grids[0])
@@ -127,9 +149,6 @@ class ESVRReader(VTKPythonAlgorithmBase):
         info.Set(vtkImageData.SPACING(), spacing.tolist(), 3)
         info.Set(vtkImageData.DIRECTION(), directions.ravel().tolist(), 9)
         info.Set(self.CAN_PRODUCE_SUB_EXTENT(), 1)
-        if self._frames:
-            info.Set(Pipeline.TIME_STEPS(), [float(f) for f in self._frames], len(self._frames))
-            info.Set(Pipeline.TIME_RANGE(), [float(self._frames[0]), float(self._frames[-1])], 2)
         return 1
 
     def RequestData(self, request, inputs, outputs):
@@ -137,21 +156,23 @@ class ESVRReader(VTKPythonAlgorithmBase):
         extent = list(info.Get(Pipeline.UPDATE_EXTENT()))
         box = box_of(extent)
         frame = self._frame_at(info)
-        grids = self._chosen(self._read(frame, box))
+        named = self._chosen(self._read(frame, box))
         image = vtkImageData.GetData(outputs)
-        image.SetExtent(extent)
-        origin, spacing, directions = geometry_of(grids[0])
+        image.SetExtent(extent if named else EMPTY)
+        if frame is not None:
+            image.GetInformation().Set(image.DATA_TIME_STEP(), float(frame))
+        if not named:
+            return 1
+        origin, spacing, directions = geometry_of(named[0][1])
         image.SetOrigin(origin)
         image.SetSpacing(spacing)
         matrix = vtkMatrix3x3()
         matrix.DeepCopy(directions.ravel().tolist())
         image.SetDirectionMatrix(matrix)
-        for grid in grids:
+        for name, grid in named:
             values = grid.to_volume(box).to_numpy(box)
             array = numpy_to_vtk(values.ravel(order="F"), deep=True)  # x is fastest
-            array.SetName(grid.name)
+            array.SetName(name)
             image.GetPointData().AddArray(array)
-        image.GetPointData().SetActiveScalars(grids[0].name)
-        if frame is not None:
-            image.GetInformation().Set(image.DATA_TIME_STEP(), float(frame))
+        image.GetPointData().SetActiveScalars(named[0][0])
         return 1

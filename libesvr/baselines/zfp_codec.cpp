@@ -6,6 +6,7 @@
 #include <string>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 
 namespace esvr {
 namespace {
@@ -60,9 +61,10 @@ std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& sett
   zfp_stream_set_bit_stream(stream.get(), bits.get());
   zfp_stream_rewind(stream.get());
   if (zfp_write_header(stream.get(), field.get(), ZFP_HEADER_FULL) == 0)
-    throw UsageError("grid '" + grid + "': ZFP has no array of this size");
+    throw UsageError("grid '" + shownName(grid) + "': ZFP has no array of this size");
   const std::size_t size = zfp_compress(stream.get(), field.get());
-  if (size == 0) throw RuntimeFailure("grid '" + grid + "': ZFP failed to compress its voxels");
+  if (size == 0)
+    throw RuntimeFailure("grid '" + shownName(grid) + "': ZFP failed to compress its voxels");
   bytes.resize(size);
   return bytes;
 }

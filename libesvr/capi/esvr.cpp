@@ -13,6 +13,7 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/sparse_volume.h"
 #include "field/voxel_rule.h"
 
@@ -23,11 +24,11 @@ using capi::require;
 
 static_assert(ESVR_BRICK_SIDE == kBrickSide && ESVR_BRICK_VOXELS == kBrickVoxels);
 
-/// A limit of the caller, of which 0 stands for none. Where addresses have 32 bits, sizes in the
-/// code have, too, so that content stays below them.
+/// A limit of the caller, of which 0 stands for the usual one. Where addresses have 32 bits, sizes in
+/// the code have, too, so that content stays below them.
 std::uint64_t limitOf(std::uint64_t maxMemory) {
   constexpr std::uint64_t kMost = sizeof(std::size_t) < 8 ? std::uint64_t{1} << 31 : kNoMemoryLimit;
-  return maxMemory == 0 ? kMost : std::min(maxMemory, kMost);
+  return std::min(maxMemory == 0 ? usualMemoryLimit() : maxMemory, kMost);
 }
 
 /// Carried grids are checked, but nothing here can read their bytes.
@@ -58,7 +59,7 @@ esvr_grid describe(const StoredGrid& grid) {
     d.has_transform = 1;
     std::copy(affine->begin(), affine->end(), d.transform);
   }
-  d.background = grid.field.background;
+  d.background = float(grid.descriptor.background);
   d.low = grid.valueMin, d.high = grid.valueMax;
   set(d.box, grid.activeBox);
   d.active_voxels = grid.activeVoxels;
@@ -180,7 +181,7 @@ std::vector<Place> placesOf(const double* places, std::size_t count) {
 
 void evaluate(const StoredGrid& grid, std::span<const Place> places, std::span<float> values) {
   if (!followsFromEllipsoids(grid))
-    throw UsageError("grid '" + grid.descriptor.name +
+    throw UsageError("grid '" + shownName(grid.descriptor.name) +
                      "' is not the sum of ellipsoids alone, and can only be decoded to voxels");
   evaluatePlaces(grid.field, places, values);
   const VoxelRule rule = makeVoxelRule(grid.field.background, voxelRule(grid));

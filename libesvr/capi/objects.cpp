@@ -1,19 +1,25 @@
 #include "capi/objects.h"
 
+#include <algorithm>
+#include <array>
+#include <cstring>
 #include <new>
 #include <stdexcept>
+#include <string_view>
 
 namespace esvr::capi {
 namespace {
 
-thread_local std::string lastError;
+/// The text of the last failure. It must be kept when there is no memory left, so that it is not
+/// allocated; a text that is longer ends in "...". Texts have a path of at most 4,096 bytes in them.
+thread_local std::array<char, 4608> lastText{};
 
-esvr_status fail(esvr_status status, const char* text) {
-  try {
-    lastError = text;
-  } catch (const std::bad_alloc&) {
-    lastError.clear();
-  }
+esvr_status fail(esvr_status status, const char* text) noexcept {
+  constexpr std::string_view kCut = "...";
+  const std::size_t most = lastText.size() - 1, bytes = std::min(std::strlen(text), most);
+  std::memmove(lastText.data(), text, bytes);
+  lastText[bytes] = '\0';
+  if (bytes == most) std::ranges::copy(kCut, lastText.begin() + std::ptrdiff_t(most - kCut.size()));
   return status;
 }
 
@@ -32,10 +38,9 @@ esvr_status statusOf(ErrorKind kind) {
 
 }  // namespace
 
-esvr_status guarded(const std::function<void()>& task) noexcept {
+esvr_status statusOfException() noexcept {
   try {
-    task();
-    return ESVR_OK;
+    throw;
   } catch (const Error& error) {
     return fail(statusOf(error.kind()), error.what());
   } catch (const std::bad_alloc&) {
@@ -44,9 +49,11 @@ esvr_status guarded(const std::function<void()>& task) noexcept {
     return fail(ESVR_MEMORY, "an array would be larger than the address space");
   } catch (const std::exception& error) {
     return fail(ESVR_FAILED, error.what());
+  } catch (...) {
+    return fail(ESVR_FAILED, "an unknown failure");
   }
 }
 
 }  // namespace esvr::capi
 
-const char* esvr_error(void) { return esvr::capi::lastError.c_str(); }
+const char* esvr_error(void) { return esvr::capi::lastText.data(); }

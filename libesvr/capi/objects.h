@@ -1,7 +1,6 @@
 #pragma once
 /// The objects behind the C interface (esvr/esvr.h), and what makes statuses of exceptions.
 
-#include <functional>
 #include <string>
 #include <utility>
 
@@ -26,8 +25,20 @@ struct esvr_volume {
 
 namespace esvr::capi {
 
-/// Runs a task. Its exception becomes a status and the text of esvr_error().
-esvr_status guarded(const std::function<void()>& task) noexcept;
+/// The status of the exception that is being handled, whose text esvr_error() then returns.
+esvr_status statusOfException() noexcept;
+
+/// Runs a task. Its exception becomes a status. The task is called directly: a std::function of it
+/// might allocate memory, and fail, before the exceptions are caught.
+template <class Task>
+esvr_status guarded(const Task& task) noexcept {
+  try {
+    task();
+    return ESVR_OK;
+  } catch (...) {
+    return statusOfException();
+  }
+}
 
 inline void require(bool good, const char* otherwise) {
   if (!good) throw UsageError(otherwise);

@@ -42,4 +42,15 @@ std::uint64_t parseByteSize(const std::string& option, const std::string& text) 
   return std::uint64_t(bytes);
 }
 
+std::uint64_t parseDeviceMemory(const std::string& option, const std::string& text) {
+  constexpr double kLeastBytes = 1e6;
+  const auto number = parseLeadingNumber(text);
+  const bool isGigabytes =
+      number && number->rest.empty() && number->value > 0.0 && number->value < kLeastBytes;
+  const std::uint64_t bytes = parseByteSize(option, isGigabytes ? text + "GB" : text);
+  if (double(bytes) < kLeastBytes)
+    throw UsageError("--" + option + " must be at least 1MB, not '" + text + "'");
+  return bytes;
+}
+
 }  // namespace esvr::cli

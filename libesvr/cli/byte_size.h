@@ -11,4 +11,10 @@ namespace esvr::cli {
 /// \throws UsageError  the text is not of this form; the message names the option
 [[nodiscard]] std::uint64_t parseByteSize(const std::string& option, const std::string& text);
 
+/// Parses the memory of a GPU in the same form. A number without a unit below 1,000,000 is one of
+/// gigabytes, as in the first versions of --max-vram; as bytes it would be less than a GPU can use.
+/// \return at least 1,000,000
+/// \throws UsageError  the text is not of this form, or the memory is less
+[[nodiscard]] std::uint64_t parseDeviceMemory(const std::string& option, const std::string& text);
+
 }  // namespace esvr::cli

@@ -3,9 +3,11 @@
 #include <boost/program_options/errors.hpp>
 #include <boost/program_options/parsers.hpp>
 #include <iostream>
-#include <limits>
+#include <memory>
 #include <sstream>
+#include <utility>
 
+#include "cli/host_memory.h"
 #include "cli/version_text.h"
 #include "cli/wrapped_text.h"
 
@@ -14,6 +16,8 @@ namespace {
 
 constexpr unsigned kLineLength = 80;
 constexpr unsigned kMinDescriptionLength = 44;
+/// Far more than any machine has processors; each thread takes memory of its own.
+constexpr int kMostThreads = 4096;
 constexpr const char* kRest = "unexpected arguments";  // no option can have this name
 
 po::options_description commonOptions() {
@@ -34,10 +38,44 @@ Arguments withCommonOptions(po::variables_map values) {
   if (arguments.get<bool>("verbose")) arguments.verbosity = Verbosity::kVerbose;
   if (arguments.get<bool>("quiet")) arguments.verbosity = Verbosity::kQuiet;
   if (const auto threads = arguments.find<int>("threads")) {
-    requireRange("threads", *threads, 1, std::numeric_limits<int>::max());
+    requireRange("threads", *threads, 1, kMostThreads);
     arguments.threads = *threads;
   }
   return arguments;
+}
+
+/// The texts that a value holds, which may be replaced.
+std::vector<std::string*> textsOf(po::variable_value& value) {
+  if (value.empty()) return {};
+  if (auto* one = boost::any_cast<std::string>(&value.value())) return {one};
+  std::vector<std::string*> texts;
+  for (std::string& text : value.as<std::vector<std::string>>()) texts.push_back(&text);
+  return texts;
+}
+
+/// Replaces the name of a pipe by that of a file with a copy of its bytes.
+void takePipe(const Arguments& arguments, std::string& input, InputFiles& files) {
+  files.piped.push_back(std::make_shared<PipedInput>(input, scratchFolderOf(arguments)));
+  input = files.piped.back()->path().string();
+}
+
+/// Fills Arguments::inputs.
+void collectInputs(const std::vector<std::string>& volumes, const std::vector<std::string>& texts,
+                   Arguments& arguments) {
+  InputFiles files;
+  bool hasStandardInput = false;
+  const auto collect = [&](const std::string& name, bool isVolume) {
+    if (!arguments.has(name)) return;
+    for (std::string* input : textsOf(arguments.values.at(name))) {
+      if (isVolume && *input == kStandardInput && std::exchange(hasStandardInput, true))
+        throw UsageError("standard input (-) is one file; it cannot be two inputs");
+      if (isVolume && PipedInput::isPipe(*input)) takePipe(arguments, *input, files);
+      files.paths.emplace_back(*input);
+    }
+  };
+  for (const std::string& name : volumes) collect(name, true);
+  for (const std::string& name : texts) collect(name, false);
+  arguments.inputs = std::move(files);
 }
 
 void appendSection(std::ostream& out, const char* title, const std::string& text) {
@@ -144,7 +182,9 @@ std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) c
     return std::nullopt;
   }
   requireArguments(values);
-  return withCommonOptions(std::move(values));
+  Arguments arguments = withCommonOptions(std::move(values));
+  collectInputs(volumeInputs_, textInputs_, arguments);
+  return arguments;
 } catch (const po::error& error) {
   throw UsageError(error.what());
 }

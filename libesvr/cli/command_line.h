@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/input_files.h"
 #include "cli/log.h"
 #include "cli/man_page.h"
 #include "cli/program_text.h"
@@ -30,6 +31,7 @@ struct Arguments {
   po::variables_map values;
   Verbosity verbosity = Verbosity::kNormal;
   int threads = 0;  ///< 0: as many as the machine has
+  InputFiles inputs{};
 
   [[nodiscard]] bool has(const std::string& option) const { return values.count(option) != 0; }
   template <class T>
@@ -59,12 +61,19 @@ class CommandLine {
   /// Adds an argument for all remaining ones. Its value is a std::vector<std::string>.
   void repeatedArgument(const std::string& name);
 
+  /// Declares that the values of arguments or options are names of input files with volumes. They
+  /// may be "-", standard input, or the name of a pipe; parse() replaces these by names of files.
+  void volumeInputs(std::vector<std::string> names) { volumeInputs_ = std::move(names); }
+  /// The same of other input files, such as cameras, whose readers accept a pipe.
+  void textInputs(std::vector<std::string> names) { textInputs_ = std::move(names); }
+
   /// Adds a text that `--help NAME` prints instead of the whole help. Every program has the topics
   /// `man`, its man page, and `options`, the names of its options.
   void helpTopic(const std::string& name, const std::string& text);
 
   /// \return nothing if --help or --version was printed to stdout
   /// \throws UsageError  an option or an argument is invalid
+  /// \throws Error  as PipedInput, for an input that comes through a pipe
   [[nodiscard]] std::optional<Arguments> parse(int argc, const char* const* argv) const;
 
   [[nodiscard]] std::string helpText() const;
@@ -85,6 +94,7 @@ class CommandLine {
   po::options_description own_, common_;
   std::vector<Argument> arguments_;
   std::map<std::string, std::string> helpTopics_;
+  std::vector<std::string> volumeInputs_, textInputs_;  ///< names of arguments and options
   std::string rest_;  ///< the repeated argument, or a name that is not used
 };
 

@@ -1,7 +1,9 @@
 #include "cli/frame_pattern.h"
 
 #include <algorithm>
+#include <iterator>
 #include <regex>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -30,15 +32,6 @@ std::size_t digitsOfPattern(const std::string& pattern) {
   return isRun ? pattern.size() : digitsIn(pattern);
 }
 
-/// The last pattern of a path.
-std::optional<std::smatch> lastPattern(const std::string& path) {
-  static const std::regex kPattern(R"(#+|@+|%[0-9]*d|\$F[0-9]*)");
-  std::optional<std::smatch> last;
-  for (std::sregex_iterator at(path.begin(), path.end(), kPattern), end; at != end; ++at)
-    last = *at;
-  return last;
-}
-
 /// The part of a name between its beginning and its end; nothing if it has others.
 std::optional<std::string> between(const std::string& name, const std::string& prefix,
                                    const std::string& suffix) {
@@ -48,27 +41,98 @@ std::optional<std::string> between(const std::string& name, const std::string& p
   return name.substr(prefix.size(), name.size() - taken);
 }
 
+/// A text of zeros with a whole number behind them, to which nothing is added if it is longer.
+std::string padded(FrameNumber number, std::size_t digits) {
+  const std::string text = std::to_string(number);
+  return std::string(digits - std::min(digits, text.size()), '0') + text;
+}
+
+/// The fraction of a number as Houdini writes it for a substep: ".50" in "1001.50"; empty if the
+/// text is none.
+std::string fractionIn(const std::string& text) {
+  static const std::regex kSubstep(R"(-?[0-9]+(\.[0-9]+))");
+  std::smatch found;
+  return std::regex_match(text, found, kSubstep) ? found[1].str() : "";
+}
+
+bool isNumber(const std::string& text) {
+  static const std::regex kNumber("-?[0-9]+");
+  return std::regex_match(text, kNumber);
+}
+
+bool isThere(const fs::path& path) {
+  std::error_code unreadable;  // whoever opens the file reports the reason
+  return fs::exists(path, unreadable);
+}
+
 }  // namespace
 
 struct FramePattern::Entry {
-  FrameNumber frame = 0;
-  bool hasDigits = false;  ///< the name has the number of digits that the pattern gives
-  fs::path path;           ///< with the name's own digits
+  std::optional<FrameNumber> frame;  ///< nothing: a substep's, or too large
+  std::string digits;                ///< the name's own
+  fs::path path;
 };
 
-std::optional<FramePattern> FramePattern::in(const std::string& path) {
-  const auto found = lastPattern(path);
-  if (!found) return std::nullopt;
+std::string FrameListing::hint(const std::vector<FrameNumber>* wanted) const {
+  const std::set<FrameNumber> in(wanted ? wanted->begin() : others.begin(),
+                                 wanted ? wanted->end() : others.end());
+  std::vector<FrameNumber> numbers;
+  std::ranges::copy_if(others, std::back_inserter(numbers),
+                       [&](FrameNumber number) { return in.contains(number); });
+  std::string text;
+  if (!numbers.empty()) {
+    text = textOfFrames(numbers) +
+           (numbers.size() == 1 ? " looks like a frame and is none: "
+                                : " look like frames and are none: ") +
+           exampleOfOthers.string() + " has another number of digits than the pattern";
+    text += patternOfAll.empty() ? " (# and #### are 4 digits, @ is as many as needed)"
+                                 : " (" + patternOfAll + " takes all)";
+  }
+  if (substeps > 0)
+    text += std::string(text.empty() ? "" : "; ") + exampleOfSubsteps.string() +
+            (substeps > 1 ? " and " + std::to_string(substeps - 1) + " more look" : " looks") +
+            " like a substep of Houdini, and frames have whole numbers; " + patternOfSubsteps +
+            " takes the substeps of one fraction";
+  if (!tooLarge.empty())
+    text += std::string(text.empty() ? "" : "; ") + tooLarge.string() +
+            " has a number that is too large for a frame";
+  return text;
+}
+
+std::optional<FramePattern> FramePattern::inPart(const std::string& path, std::size_t begin,
+                                                 std::size_t end) {
+  static const std::regex kPattern(R"(#+|@+|%[0-9]*d|\$F[0-9]*)");
+  const std::string part = path.substr(begin, end - begin);
+  std::optional<std::smatch> last;
+  for (std::sregex_iterator at(part.begin(), part.end(), kPattern), none; at != none; ++at)
+    last = *at;
+  if (!last) return std::nullopt;
   FramePattern made;
   made.text_ = path;
-  made.pattern_ = found->str();
-  made.before_ = path.substr(0, std::size_t(found->position()));
-  made.after_ = found->suffix().str();
+  made.pattern_ = last->str();
+  made.before_ = path.substr(0, begin + std::size_t(last->position()));
+  made.after_ = path.substr(made.before_.size() + made.pattern_.size());
   made.digits_ = digitsOfPattern(made.pattern_);
   if (made.digits_ > kMostDigits)
     throw UsageError(path + ": the number of a frame has at most " + std::to_string(kMostDigits) +
                      " digits");
   return made;
+}
+
+std::optional<FramePattern> FramePattern::in(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  return inPart(path, slash == std::string::npos ? 0 : slash + 1, path.size());
+}
+
+std::optional<FramePattern> FramePattern::ofInput(const std::string& path) {
+  if (isThere(path)) return std::nullopt;
+  for (std::size_t end = path.size();;) {
+    const std::size_t slash = end == 0 ? std::string::npos : path.rfind('/', end - 1);
+    const std::size_t begin = slash == std::string::npos ? 0 : slash + 1;
+    if (auto found = inPart(path, begin, end); found && !isThere(path.substr(0, end))) return found;
+    if (slash == std::string::npos) return std::nullopt;
+    end = slash;
+  }
 }
 
 FramePattern FramePattern::whole(const std::string& path) {
@@ -78,14 +142,23 @@ FramePattern FramePattern::whole(const std::string& path) {
 }
 
 std::string FramePattern::digitsOf(FrameNumber frame) const {
-  const std::string digits = std::to_string(frame < 0 ? -frame : frame);
-  const std::string minus = frame < 0 ? "-" : "";
-  const std::size_t taken = minus.size() + digits.size();
-  return minus + std::string(digits_ - std::min(digits_, taken), '0') + digits;
+  if (frame >= 0) return padded(frame, digits_);
+  return "-" + padded(-frame, digits_ - 1);
+}
+
+std::string FramePattern::blenderDigitsOf(FrameNumber frame) const {
+  return frame < 0 ? "-" + padded(-frame, digits_) : padded(frame, digits_);
 }
 
 fs::path FramePattern::at(FrameNumber frame) const {
   return isWhole() ? text_ : before_ + digitsOf(frame) + after_;
+}
+
+fs::path FramePattern::toRead(FrameNumber frame) const {
+  fs::path own = at(frame);
+  if (isWhole() || frame >= 0 || isThere(own)) return own;
+  fs::path blenders = before_ + blenderDigitsOf(frame) + after_;
+  return isThere(blenders) ? blenders : own;
 }
 
 fs::path FramePattern::folder() const {
@@ -101,29 +174,58 @@ std::vector<FramePattern::Entry> FramePattern::entries() const {
   for (fs::directory_iterator at(folder(), unreadable), end; !unreadable && at != end;
        at.increment(unreadable)) {
     const auto digits = between(at->path().filename().string(), prefix, suffix);
-    const auto frame = digits ? parseWhole(*digits) : std::nullopt;
-    if (!frame || !isFrameNumber(*frame)) continue;
-    Entry entry{*frame, *digits == digitsOf(*frame), before_ + *digits + after_};
-    std::error_code notThere;  // a link may lead to nothing
-    if (fs::exists(entry.path, notThere)) found.push_back(std::move(entry));
+    if (!digits) continue;
+    auto frame = parseWhole(*digits);
+    if (frame && !isFrameNumber(*frame)) frame.reset();
+    if (!frame && fractionIn(*digits).empty() && !isNumber(*digits)) continue;
+    Entry entry{frame, *digits, before_ + *digits + after_};
+    if (isThere(entry.path)) found.push_back(std::move(entry));  // a link may lead to nothing
   }
+  std::ranges::sort(found, {}, &Entry::path);
   return found;
 }
 
-std::vector<FrameNumber> FramePattern::onDisk() const {
-  std::vector<FrameNumber> frames;
-  for (const Entry& entry : entries())
-    if (entry.hasDigits) frames.push_back(entry.frame);
-  std::ranges::sort(frames);
-  return frames;
+FrameListing FramePattern::onDisk() const {
+  const std::vector<Entry> all = entries();
+  FrameListing listing;
+  std::set<FrameNumber> frames, others;
+  for (const Entry& entry : all)
+    if (entry.frame && entry.digits == digitsOf(*entry.frame)) frames.insert(*entry.frame);
+  std::size_t fewestDigits = digits_;
+  for (const Entry& entry : all) {
+    if (entry.frame && entry.digits == digitsOf(*entry.frame)) continue;
+    if (!entry.frame && isNumber(entry.digits)) {
+      listing.tooLarge = entry.path;
+    } else if (!entry.frame) {
+      if (listing.substeps++ > 0) continue;
+      listing.exampleOfSubsteps = entry.path;
+      listing.patternOfSubsteps = before_ + pattern_ + fractionIn(entry.digits) + after_;
+    } else if (entry.digits == blenderDigitsOf(*entry.frame) &&
+               frames.insert(*entry.frame).second) {
+      continue;  // Blender's form, where the other form is absent
+    } else {
+      if (others.empty()) listing.exampleOfOthers = entry.path;
+      others.insert(*entry.frame);
+      fewestDigits = std::min(fewestDigits, entry.digits.size());
+    }
+  }
+  listing.frames.assign(frames.begin(), frames.end());
+  listing.others.assign(others.begin(), others.end());
+  if (!others.empty()) listing.patternOfAll = patternOfAll(all, fewestDigits);
+  return listing;
 }
 
-std::optional<fs::path> FramePattern::withOtherDigits() const {
-  std::vector<fs::path> paths;
-  for (const Entry& entry : entries())
-    if (!entry.hasDigits) paths.push_back(entry.path);
-  if (paths.empty()) return std::nullopt;
-  return *std::ranges::min_element(paths);
+std::string FramePattern::patternOfAll(const std::vector<Entry>& all, std::size_t digits) const {
+  FramePattern other = *this;
+  other.digits_ = digits;
+  std::set<FrameNumber> numbers;
+  for (const Entry& entry : all) {
+    if (!entry.frame) continue;
+    const bool isIts = entry.digits == other.digitsOf(*entry.frame) ||
+                       entry.digits == other.blenderDigitsOf(*entry.frame);
+    if (!isIts || !numbers.insert(*entry.frame).second) return {};
+  }
+  return before_ + std::string(digits, '@') + after_;
 }
 
 }  // namespace esvr::cli

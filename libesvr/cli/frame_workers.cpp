@@ -25,6 +25,7 @@ class Workers {
 
  private:
   void work(int worker) noexcept try {
+    const CancelScope scope(&run_.cancel);
     for (std::size_t i; !stopped() && (i = next_++) < run_.tasks;)
       if (!job_({i, worker}) && run_.onError == OnFrameError::kStop) stop_ = true;
   } catch (...) {

@@ -1,8 +1,5 @@
 #include "cli/grid_stability.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "esvr/grid_coding.h"
 
 namespace esvr::cli {
@@ -17,9 +14,8 @@ StabilityOptions stabilityOptionsOf(const StoredGrid& grid, std::size_t samples)
   return options;
 }
 
-double largestMagnitude(const StoredGrid& grid) {
-  return std::max({std::abs(double(grid.valueMin)), std::abs(double(grid.valueMax)),
-                   std::abs(double(grid.field.background))});
+double peakOfSource(const StoredGrid& grid) {
+  return peakOf({grid.valueMin, grid.valueMax}, grid.descriptor.background);
 }
 
 }  // namespace esvr::cli

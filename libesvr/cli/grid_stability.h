@@ -11,8 +11,7 @@ namespace esvr::cli {
 /// \param samples  number of bricks
 [[nodiscard]] StabilityOptions stabilityOptionsOf(const StoredGrid& grid, std::size_t samples);
 
-/// The largest magnitude of the values of a grid's source, background included, to which differences
-/// are compared.
-[[nodiscard]] double largestMagnitude(const StoredGrid& grid);
+/// The peak of a grid's source (peakOf, sparse_volume.h), to which differences are compared.
+[[nodiscard]] double peakOfSource(const StoredGrid& grid);
 
 }  // namespace esvr::cli

@@ -11,6 +11,8 @@
 namespace esvr::cli {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr const char* kMaxMemory = "max-memory";
 constexpr const char* kScratch = "scratch";
 constexpr double kShare = 0.75;  // the rest is left to other programs
@@ -24,15 +26,21 @@ std::uint64_t maxBytesOf(const Arguments& arguments) {
   return std::uint64_t(kShare * double(availableMemory()));
 }
 
-/// The default is not the folder for temporary files, /tmp, which is in memory on many systems.
-std::filesystem::path scratchOf(const Arguments& arguments) {
-  namespace fs = std::filesystem;
+fs::path requireFolder(const fs::path& folder, const std::string& given) {
+  std::error_code unreadable;
+  if (fs::is_directory(folder, unreadable)) return folder;
+  throw UsageError(given + ": " + folder.string() + " is not a folder");
+}
+
+fs::path usualScratch() {
   const char* variable = std::getenv("TMPDIR");
-  const fs::path usual = variable && *variable ? variable : "/var/tmp";
+  return variable && *variable ? variable : "/var/tmp";
+}
+
+/// Whoever writes a file there reports that the usual folder does not exist; most runs write none.
+fs::path scratchOf(const Arguments& arguments) {
   const auto given = arguments.find<std::string>(kScratch);
-  if (given && !fs::is_directory(*given))
-    throw UsageError("--" + std::string(kScratch) + ": " + *given + " is not a folder");
-  return given ? fs::path(*given) : usual;
+  return given ? requireFolder(*given, "--" + std::string(kScratch)) : usualScratch();
 }
 
 }  // namespace
@@ -46,6 +54,12 @@ void addHostMemory(CommandLine& line) {
       "begins")(kScratch, po::value<std::string>()->value_name("DIR"),
                 "folder for the file that holds voxels which do not fit into memory (default: "
                 "$TMPDIR, or /var/tmp)");
+}
+
+fs::path scratchFolder() { return requireFolder(usualScratch(), "the variable TMPDIR"); }
+
+fs::path scratchFolderOf(const Arguments& arguments) {
+  return arguments.has(kScratch) ? scratchOf(arguments) : scratchFolder();
 }
 
 HostMemory hostMemoryOf(const Arguments& arguments) {

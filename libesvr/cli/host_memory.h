@@ -2,6 +2,7 @@
 /// The options --max-memory and --scratch, which limit the memory of a program.
 
 #include <cstdint>
+#include <filesystem>
 
 #include "cli/command_line.h"
 #include "esvr/memory_limit.h"
@@ -22,5 +23,13 @@ void addHostMemory(CommandLine& line);
 /// files in the folder of --scratch.
 /// \throws UsageError  the value is not a size, or the folder does not exist
 [[nodiscard]] HostMemory hostMemoryOf(const Arguments& arguments);
+
+/// The folder of --scratch, or that of the variable TMPDIR, or /var/tmp: /tmp is in memory on many
+/// systems.
+/// \throws UsageError  the folder does not exist
+[[nodiscard]] std::filesystem::path scratchFolderOf(const Arguments& arguments);
+
+/// The same without options.
+[[nodiscard]] std::filesystem::path scratchFolder();
 
 }  // namespace esvr::cli

@@ -4,28 +4,28 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "core/atomic_file.h"
+#include "cli/bytes_file.h"
+#include "esvr/grid_names.h"
+#include "esvr/progress.h"
 
 namespace esvr::cli {
-namespace {
 
-std::string textOf(const nlohmann::ordered_json& json) {
-  constexpr int kIndent = 2;
-  constexpr bool kAsciiOnly = false;
-  return json.dump(kIndent, ' ', kAsciiOnly, nlohmann::json::error_handler_t::replace) + '\n';
+std::string jsonText(const nlohmann::ordered_json& json, int indent) {
+  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
+  std::string text = json.dump(indent, ' ', false, kReplace);
+  const bool isShown = shownText(text, LineEnds::kKeep) == text;
+  return isShown ? text : json.dump(indent, ' ', true, kReplace);
 }
 
-}  // namespace
-
 void writeJson(const JsonFile& file, const nlohmann::ordered_json& json) {
-  const std::string text = textOf(json);
+  constexpr int kIndent = 2;
+  const std::string text = jsonText(json, kIndent) + '\n';
   if (file.path == kStandardOutput) {
     std::cout << text;
     return;
   }
-  AtomicFile output(file.path, file.overwrite);
-  output.write(std::as_bytes(std::span(text)));
-  output.commit();
+  const Completion completion;  // a report tells of an interrupted run, too
+  writeBytes(file.path, std::as_bytes(std::span(text)), file.overwrite);
 }
 
 }  // namespace esvr::cli

@@ -1,10 +1,16 @@
 #include "cli/output.h"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include "core/atomic_file.h"
+#include "core/publish_file.h"
+#include "core/read_input.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -12,10 +18,34 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool sameFile(const fs::path& a, const fs::path& b) {
-  std::error_code ignored;  // files that do not exist cannot be compared by their inodes
-  return fs::equivalent(a, b, ignored) ||
-         fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
+/// The files of a run, by their names after all links and, if they exist, by their inodes.
+class NotedFiles {
+ public:
+  /// \return a file that was noted before and is the same one; null: there is none
+  const fs::path* find(const fs::path& file) const {
+    const auto name = names_.find(followLinks(fs::absolute(file)));
+    if (name != names_.end()) return &name->second;
+    const auto stamp = stampOf(file);
+    const auto inode = stamp ? inodes_.find({stamp->device, stamp->inode}) : inodes_.end();
+    return inode == inodes_.end() ? nullptr : &inode->second;
+  }
+
+  void note(const fs::path& file) {
+    names_.emplace(followLinks(fs::absolute(file)), file);
+    if (const auto stamp = stampOf(file))
+      inodes_.emplace(std::pair(stamp->device, stamp->inode), file);
+  }
+
+ private:
+  std::map<fs::path, fs::path> names_;
+  std::map<std::pair<std::uint64_t, std::uint64_t>, fs::path> inodes_;
+};
+
+bool isFile(const fs::path& path) {
+  std::error_code missing;
+  const auto type = fs::status(path, missing).type();
+  return !path.empty() && path != "-" &&
+         (type == fs::file_type::regular || type == fs::file_type::not_found);
 }
 
 std::string alternatives(std::initializer_list<std::string_view> extensions) {
@@ -25,6 +55,13 @@ std::string alternatives(std::initializer_list<std::string_view> extensions) {
     text += extension;
   }
   return text;
+}
+
+/// False for files that are written by way of a name or in several steps.
+bool canBeWrittenDirectly(std::initializer_list<std::string_view> extensions) {
+  constexpr std::array<std::string_view, 5> kNotDirectly{".esvr", ".vdb", ".nvdb", ".mp4", ".webm"};
+  return std::find_first_of(extensions.begin(), extensions.end(), kNotDirectly.begin(),
+                            kNotDirectly.end()) == extensions.end();
 }
 
 }  // namespace
@@ -38,6 +75,7 @@ void requireExtension(const fs::path& path, std::initializer_list<std::string_vi
 
 void checkOutput(const fs::path& path, std::initializer_list<std::string_view> extensions,
                  bool overwrite) {
+  if (isWrittenDirectly(path) && canBeWrittenDirectly(extensions)) return;  // any name will do
   requireExtension(path, extensions);
   std::error_code unreadable;  // AtomicFile reports the reason
   if (!overwrite && fs::exists(path, unreadable))
@@ -46,11 +84,17 @@ void checkOutput(const fs::path& path, std::initializer_list<std::string_view> e
   AtomicFile probe(path, overwrite);
 }
 
-void requireDistinct(const std::vector<fs::path>& files) {
-  for (std::size_t i = 0; i < files.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      if (sameFile(files[i], files[j]))
-        throw UsageError(files[j].string() + " and " + files[i].string() + " are one file");
+void requireSeparate(const std::vector<fs::path>& inputs, const std::vector<fs::path>& outputs) {
+  NotedFiles noted;
+  for (const fs::path& input : inputs)
+    if (isFile(input)) noted.note(input);
+  for (const fs::path& output : outputs) {
+    if (!isFile(output)) continue;
+    if (const fs::path* other = noted.find(output))
+      throw UsageError(other->string() + " and " + output.string() +
+                       " are one file; an output needs a name of its own");
+    noted.note(output);
+  }
 }
 
 }  // namespace esvr::cli

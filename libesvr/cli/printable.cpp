@@ -1,19 +1,11 @@
 #include "cli/printable.h"
 
+#include "esvr/grid_names.h"
+
 namespace esvr::cli {
-namespace {
 
-bool isControl(char c) {
-  constexpr char kDelete = 0x7f;
-  return (static_cast<unsigned char>(c) < ' ' && c != '\n') || c == kDelete;
-}
+std::string printable(const std::string& text) { return shownText(text, LineEnds::kReplace); }
 
-}  // namespace
-
-std::string printable(std::string text) {
-  for (char& c : text)
-    if (isControl(c)) c = '?';
-  return text;
-}
+std::string printableMessage(const std::string& text) { return shownText(text, LineEnds::kKeep); }
 
 }  // namespace esvr::cli

@@ -5,6 +5,7 @@
 
 #include "cli/failure.h"
 #include "cli/printable.h"
+#include "core/publish_file.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
@@ -21,11 +22,15 @@ int runAndFlush(const std::function<int()>& body) {
 
 int runMain(const std::string& program, const std::function<int()>& body) {
   const auto complain = [&](const std::string& text) {
-    std::cerr << program << ": " << printable(text) << '\n';
+    std::cerr << program << ": " << printableMessage(text) << '\n';
   };
+  keepStandardDescriptors();
   std::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes then gives an error, not a signal
   try {
     return runAndFlush(body);
+  } catch (const Cancelled& error) {
+    complain("interrupted; nothing was written");
+    return error.exitCode();
   } catch (const MemoryExceeded& error) {
     complain(error.what());
     std::cerr << "The option --max-memory allows more.\n";

@@ -46,7 +46,9 @@ FramePattern outputPattern(const Arguments& arguments, const FramePattern& input
   const auto output = FramePattern::in(text);
   if (output) return *output;
   if (allowed.output) return FramePattern::whole(text);
-  throw UsageError("'" + text + "' has no pattern for the number of a frame, but '" + input.text() +
+  const bool isInFolder = FramePattern::ofInput(text).has_value();
+  throw UsageError("'" + text + "' has no pattern for the number of a frame" +
+                   (isInFolder ? " in the name of the file" : "") + ", but '" + input.text() +
                    (input.isWhole() ? "' holds a sequence" : "' has one") +
                    "; each frame needs a file of its own, for example '" +
                    withPattern(text, input.isWhole() ? kUsualPattern : input.pattern()) + "'");
@@ -65,24 +67,9 @@ OnFrameError onErrorOf(const Arguments& arguments) {
       {{"continue", OnFrameError::kContinue}, {"stop", OnFrameError::kStop}});
 }
 
-std::vector<FrameNumber> framesOnDisk(const FramePattern& input) {
-  auto frames = input.onDisk();
-  if (!frames.empty()) return frames;
-  std::string text = "no file matches " + input.text();
-  if (const auto other = input.withOtherDigits())
-    text += "; " + other->string() +
-            " has another number of digits (# and #### are 4 digits, @ is as many as needed)";
-  throw BadInput(text);
-}
-
-std::vector<FrameNumber> wantedNumbers(const Sequence& sequence) {
-  if (sequence.frames) return *sequence.frames;
-  return sequence.stored ? *sequence.stored : framesOnDisk(sequence.input);
-}
-
 bool hasInput(const Sequence& sequence, FrameNumber number) {
   if (sequence.stored) return std::ranges::binary_search(*sequence.stored, number);
-  return isThere(sequence.input.at(number));
+  return isThere(sequence.input.toRead(number));
 }
 
 std::vector<FrameNumber> missingNumbers(const std::vector<Frame>& frames) {
@@ -108,16 +95,20 @@ void holdFrames(const Sequence& sequence, std::vector<Frame>& frames) {
   }
 }
 
-void treatMissing(const Sequence& sequence, std::vector<Frame>& frames) {
+/// \param hint  what looks like frames and is none; may be empty
+void treatMissing(const Sequence& sequence, std::vector<Frame>& frames, const std::string& hint) {
   const auto missing = missingNumbers(frames);
   if (missing.empty()) return;
   const std::string text = sequence.input.text() + ": " +
                            (missing.size() == 1 ? "frame " : "frames ") + textOfFrames(missing) +
                            (missing.size() == 1 ? " is missing" : " are missing");
-  if (missing.size() == frames.size()) throw BadInput(text + ", and no other frame is wanted");
+  const std::string others = hint.empty() ? "" : "; " + hint;
+  if (missing.size() == frames.size())
+    throw BadInput(text + ", and no other frame is wanted" + others);
   if (sequence.missing == MissingFrame::kError)
     throw BadInput(text +
-                   " (--missing skip leaves them out, --missing hold repeats the frame before)");
+                   " (--missing skip leaves them out, --missing hold repeats the frame before)" +
+                   others);
   if (sequence.missing == MissingFrame::kHold) holdFrames(sequence, frames);
 }
 
@@ -137,7 +128,27 @@ void refuseExisting(const std::vector<Frame>& frames) {
   throw RuntimeFailure(text + "; --force replaces files");
 }
 
+void requireSeparateFrames(const Sequence& sequence, const std::vector<Frame>& frames,
+                           const FrameOutputRules& rules) {
+  std::vector<fs::path> inputs = rules.moreInputs, outputs = rules.moreOutputs;
+  for (const Frame& frame : frames) {
+    if (!frame.missing) inputs.push_back(frame.input);
+    if ((!frame.missing || frame.holds) && !sequence.output.isWhole())
+      outputs.push_back(frame.output);
+  }
+  if (sequence.output.isWhole()) outputs.emplace_back(sequence.output.text());
+  requireSeparate(inputs, outputs);
+}
+
 }  // namespace
+
+std::vector<fs::path> filesOfInput(const std::string& input) {
+  const auto pattern = FramePattern::ofInput(input);
+  if (!pattern) return {input};
+  std::vector<fs::path> files;
+  for (const FrameNumber frame : pattern->onDisk().frames) files.push_back(pattern->toRead(frame));
+  return files;
+}
 
 void addSequenceOptions(po::options_description& options) {
   // clang-format off
@@ -164,7 +175,7 @@ std::optional<std::vector<FrameNumber>> framesInFile(const fs::path& path) {
 std::optional<Sequence> readSequence(const Arguments& arguments, WholeFiles allowed) {
   const auto& text = arguments.get<std::string>("input");
   auto stored = allowed.input ? framesInFile(text) : std::nullopt;
-  auto input = isThere(text) ? std::nullopt : FramePattern::in(text);
+  auto input = FramePattern::ofInput(text);
   if (stored) input = FramePattern::whole(text);
   if (!input) {
     refuseSequenceOptions(arguments);
@@ -179,16 +190,31 @@ std::optional<Sequence> readSequence(const Arguments& arguments, WholeFiles allo
   return sequence;
 }
 
-std::vector<Frame> planFrames(const Sequence& sequence) {
+FrameListing framesOnDisk(const FramePattern& input) {
+  FrameListing listing = input.onDisk();
+  if (!listing.frames.empty()) return listing;
+  const std::string hint = listing.hint();
+  throw BadInput("no file matches " + input.text() + (hint.empty() ? "" : "; " + hint));
+}
+
+std::vector<Frame> planFrames(const Sequence& sequence, const Log& log) {
+  FrameListing listing;
+  if (!sequence.stored)
+    listing = sequence.frames ? sequence.input.onDisk() : framesOnDisk(sequence.input);
+  const auto& wanted = sequence.frames   ? *sequence.frames
+                       : sequence.stored ? *sequence.stored
+                                         : listing.frames;
   std::vector<Frame> frames;
-  for (const FrameNumber number : wantedNumbers(sequence))
+  for (const FrameNumber number : wanted)
     frames.push_back({number,
-                      sequence.input.at(number),
+                      sequence.input.toRead(number),
                       sequence.output.at(number),
                       !hasInput(sequence, number),
                       {}});
   if (sequence.output.isWhole()) std::ranges::sort(frames, {}, &Frame::number);
-  treatMissing(sequence, frames);
+  const std::string hint = listing.hint(sequence.frames ? &wanted : nullptr);
+  treatMissing(sequence, frames, hint);
+  if (!hint.empty()) log.warning(sequence.input.text() + ": " + hint);
   return frames;
 }
 
@@ -201,7 +227,7 @@ std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& fram
 
 void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,
                        const FrameOutputRules& rules) {
-  for (const Frame& frame : frames) requireDistinct({frame.input, frame.output});
+  requireSeparateFrames(sequence, frames, rules);
   if (sequence.output.isWhole())
     return checkOutput(sequence.output.text(), rules.extensions, rules.mayExist);
   if (!rules.mayExist) refuseExisting(frames);
@@ -209,8 +235,7 @@ void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frame
   if (!isThere(sequence.output.folder()))
     throw RuntimeFailure("cannot write " + sequence.output.text() + ": there is no folder " +
                          sequence.output.folder().string());
-  // One file shows whether the folder is writable. The folders of frames need not exist yet.
-  if (!sequence.output.isInFolder()) checkOutput(frames.front().output, rules.extensions, true);
+  checkOutput(frames.front().output, rules.extensions, true);  // the folder is writable
 }
 
 }  // namespace esvr::cli

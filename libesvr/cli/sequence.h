@@ -14,6 +14,7 @@
 #include "cli/command_line.h"
 #include "cli/frame_pattern.h"
 #include "cli/frame_range.h"
+#include "cli/log.h"
 
 namespace esvr::cli {
 
@@ -57,6 +58,10 @@ void addSequenceOptions(po::options_description& options);
 /// \throws BadInput  as for framesInFile
 [[nodiscard]] std::optional<Sequence> readSequence(const Arguments& arguments, WholeFiles allowed);
 
+/// The frames of a pattern.
+/// \throws BadInput  there are none; the text names what looks like frames
+[[nodiscard]] FrameListing framesOnDisk(const FramePattern& input);
+
 /// A frame of a sequence.
 struct Frame {
   FrameNumber number = 0;
@@ -66,10 +71,10 @@ struct Frame {
 };
 
 /// The frames of a sequence in the order in which they are named, or by increasing numbers if the
-/// output is one file.
+/// output is one file. A warning says which names look like frames and are none.
 /// \throws BadInput  no frame exists; or frames are missing, and MissingFrame::kError is wanted, or
 ///                   there is no frame to hold. The text names them
-[[nodiscard]] std::vector<Frame> planFrames(const Sequence& sequence);
+[[nodiscard]] std::vector<Frame> planFrames(const Sequence& sequence, const Log& log);
 
 /// The frames that hold a frame, by the index of that frame.
 [[nodiscard]] std::multimap<std::size_t, std::size_t> holdersOf(const std::vector<Frame>& frames);
@@ -77,10 +82,15 @@ struct Frame {
 struct FrameOutputRules {
   std::initializer_list<std::string_view> extensions;  ///< those that an output may have
   bool mayExist = false;                               ///< outputs that exist are no error
+  std::vector<std::filesystem::path> moreInputs{};     ///< other files that the run reads
+  std::vector<std::filesystem::path> moreOutputs{};    ///< other files that it writes: its report
 };
 
+/// The files that an input stands for: the file of that name, or those of all frames of a pattern.
+[[nodiscard]] std::vector<std::filesystem::path> filesOfInput(const std::string& input);
+
 /// Checks before the work begins that the outputs of all frames can be written.
-/// \throws UsageError  the extension is another one; a frame's output is its input
+/// \throws UsageError  the extension is another one; as for requireSeparate, of all files of the run
 /// \throws RuntimeFailure  outputs exist, but may not; the folder is not writable
 void checkFrameOutputs(const Sequence& sequence, const std::vector<Frame>& frames,
                        const FrameOutputRules& rules);

@@ -25,7 +25,7 @@ std::string padded(const std::string& text, std::size_t width, bool flushLeft) {
 }  // namespace
 
 void Table::add(std::vector<std::string> row) {
-  for (auto& cell : row) cell = printable(std::move(cell));
+  for (auto& cell : row) cell = printable(cell);
   rows_.push_back(std::move(row));
 }
 

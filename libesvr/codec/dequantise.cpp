@@ -1,8 +1,7 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "codec/code_values.h"
 #include "codec/lattice_bits.h"
+#include "core/parallel.h"
 #include "esvr/quantised.h"
 
 namespace esvr {
@@ -55,7 +54,7 @@ void QuantisedEllipsoids::resize(std::size_t n) {
 Ellipsoids dequantise(const QuantisedEllipsoids& q) {
   Ellipsoids e;
   e.resize(q.size());
-  tbb::parallel_for(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) put(q, i, e);
   });
   return e;

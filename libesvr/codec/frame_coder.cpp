@@ -1,4 +1,5 @@
 #include "codec/frame_coder.h"
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <array>
@@ -270,7 +271,10 @@ template <class Side>
 void code(Side& side, std::span<const std::size_t> order, const PastVoxels& past,
           VoxelLayer& layer) {
   const auto coder = std::make_unique<FrameCoder<Side>>(past, layer);
-  for (const std::size_t b : order) coder->brick(side, b);
+  for (const std::size_t b : order) {
+    throwIfCancelled();
+    coder->brick(side, b);
+  }
 }
 
 }  // namespace
@@ -279,7 +283,10 @@ void chooseFrameCodes(std::span<const std::size_t> order, const PastVoxels& past
                       const FrameThrift& thrift, VoxelLayer& layer) {
   Writer writer;
   const auto coder = std::make_unique<FrameCoder<Writer>>(past, layer, &thrift);
-  for (const std::size_t b : order) coder->brick(writer, b);
+  for (const std::size_t b : order) {
+    throwIfCancelled();
+    coder->brick(writer, b);
+  }
 }
 
 void codeFrameVoxels(Writer& side, std::span<const std::size_t> order, const PastVoxels& past,

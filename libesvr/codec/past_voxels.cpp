@@ -1,12 +1,11 @@
 #include "codec/past_voxels.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <limits>
 
 #include "codec/voxel_values.h"
+#include "core/parallel.h"
 
 namespace esvr::codec {
 namespace {
@@ -56,7 +55,7 @@ PastVoxels::PastVoxels(const VoxelLayer& past, const VoxelLayer& now, const Valu
       vacantPlace_(double(codeOfValue(now, now.background))),
       places_(past.codes.size(), past.codes.get_allocator()) {
   const bool same = map == ValueMap{} && sameLattice(past, now);
-  tbb::parallel_for(std::size_t{0}, past.bricks.size(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, past.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;
       if (past.vacant[b].test(int(v)))

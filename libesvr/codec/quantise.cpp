@@ -1,5 +1,3 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include "codec/morton.h"
 #include "codec/rounding.h"
 #include "codec/sorted_axes.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/quantised.h"
 
@@ -127,7 +126,7 @@ std::vector<std::size_t> fileOrder(const QuantisedEllipsoids& q, const LatticeCh
     auto operator<=>(const Place&) const = default;
   };
   std::vector<Place> places(q.size());
-  tbb::parallel_for(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       places[i] = {layerOf(choice, i), keyOf(q, i), i};
   });
@@ -179,7 +178,7 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   q.lattice = choice.lattice;
   q.resize(e.size());
   q.precision = choice.precision;
-  tbb::parallel_for(Range(0, e.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Range(0, e.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) put(e, i, q);
   });
   order = fileOrder(q, choice);
@@ -197,7 +196,7 @@ QuantisedEllipsoids standingAlone(QuantisedEllipsoids q) {
 }
 
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q) {
-  tbb::parallel_for(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) putIntensity(intensities[i], i, q);
   });
 }

@@ -1,7 +1,5 @@
 #include "esvr/simplified_mask.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -15,6 +13,7 @@
 #include "codec/mask_costs.h"
 #include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/parallel.h"
 
 namespace esvr {
 namespace {
@@ -237,7 +236,7 @@ class MaskSimplifier {
   void move(double price, int side) {
     const MaskCosts costs = count().costs();
     for (const auto& bricks : byColor_)
-      tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t n) {
+      parallelFor(std::size_t{0}, bricks.size(), [&](std::size_t n) {
         const std::size_t b = bricks[n];
         if (isUniform(b)) return;
         MaskCube cube = cubeOf(b);
@@ -248,7 +247,7 @@ class MaskSimplifier {
 
   [[nodiscard]] MaskCounts count() const {
     using MaskRange = tbb::blocked_range<std::size_t>;
-    return tbb::parallel_reduce(
+    return parallelReduce(
         MaskRange(0, masks_.size()), MaskCounts(),
         [&](const MaskRange& bricks, MaskCounts counts) {
           for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)

@@ -7,6 +7,7 @@
 #include "codec/frame_coder.h"
 #include "codec/voxel_coder.h"
 #include "codec/voxel_model.h"
+#include "core/parallel.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr {
@@ -17,6 +18,7 @@ namespace {
 std::vector<double> placesOf(const SparseVolume& volume, const VoxelLayer& layer) {
   std::vector<double> places(layer.codes.size());
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
+    throwIfCancelled();
     const auto values = volume.brickValues(*findBrick(volume, layer.bricks[b]));
     double* place = &places[b * std::size_t(kBrickVoxels)];
     for (std::size_t v = 0; v < kBrickVoxels; ++v) place[v] = double(values[v]) * layer.divisor;

@@ -9,6 +9,7 @@
 #include "codec/brick_copies.h"
 #include "codec/voxel_mirrors.h"
 #include "codec/voxel_predictor.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 
 namespace esvr::codec {
@@ -237,7 +238,10 @@ template <class Side>
 void code(Side& side, std::span<const std::size_t> order, const VoxelModel& model,
           VoxelLayer& layer) {
   const auto coder = std::make_unique<VoxelCoder<Side>>(model, layer);
-  for (const std::size_t b : order) coder->brick(side, b);
+  for (const std::size_t b : order) {
+    throwIfCancelled();
+    coder->brick(side, b);
+  }
 }
 
 CodedPart codePart(std::span<const std::size_t> order, const VoxelModel& model,
@@ -246,6 +250,7 @@ CodedPart codePart(std::span<const std::size_t> order, const VoxelModel& model,
   const auto coder = std::make_unique<VoxelCoder<Writer>>(model, layer, thrift);
   CodedPart part;
   while (part.bricks < order.size() && part.bytes <= mostBytes) {
+    throwIfCancelled();
     coder->brick(writer, order[part.bricks++]);
     part.bytes = writer.coder.size();
   }

@@ -1,9 +1,5 @@
 #include "esvr/voxel_layer.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -12,6 +8,7 @@
 #include <unordered_set>
 
 #include "codec/voxel_values.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -59,7 +56,7 @@ void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
   layer.active = volume.active;
   layer.vacant.resize(volume.brickCount());
   layer.codes = VoxelArray<std::int32_t>(volume.values.size(), memoryOf(volume));
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
@@ -74,6 +71,25 @@ double roundingError(const SparseVolume& volume, double bound) {
   double largest = 0.0;
   for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
   return (largest + bound) * 0x1p-24;
+}
+
+/// The largest bound on values before they are rounded to halfs, with which the bound usually holds
+/// for the halfs. Where halfs are u apart and the source's value is a half, a value that is d off is
+/// off by a multiple of u after it is rounded, which exceeds the bound unless d is below
+/// (floor(bound / u) + 1/2) u.
+double boundBeforeRounding(const SparseVolume& volume, double bound) {
+  constexpr int kMantissa = 10, kLowest = -14, kHighest = 15;  // of a half: bits, exponents
+  double largest = 0.0;
+  for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
+  // A value that is off by the bound may lie beyond the next power of 2, where halfs are farther apart.
+  const int last =
+      largest + bound > 0x1p-14 ? std::min(std::ilogb(largest + bound), kHighest) : kLowest;
+  double before = bound;
+  for (int exponent = kLowest; exponent <= last; ++exponent) {
+    const double apart = std::ldexp(1.0, exponent - kMantissa);
+    before = std::min(before, (std::floor(bound / apart) + 0.5) * apart);
+  }
+  return before;
 }
 
 /// The voxels of a volume, rounded to multiples of two half steps.
@@ -110,7 +126,7 @@ void dropVacant(VoxelLayer& layer) {
 /// The voxels that differ from the background by more than a bound.
 std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
   std::vector<BrickMask> masks(volume.brickCount());
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
     for (int v = 0; v < kBrickVoxels; ++v)
       if (std::abs(double(values[v]) - volume.background) > bound) masks[b].set(v);
@@ -120,7 +136,7 @@ std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
 
 /// Makes all voxels outside a box inactive.
 void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
-  tbb::parallel_for(std::size_t{0}, masks.size(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, masks.size(), [&](std::size_t b) {
     const BrickMask all = masks[b];
     masks[b] = {};
     for (int v = 0; v < kBrickVoxels; ++v)
@@ -143,7 +159,7 @@ std::vector<BrickMask> withDiffering(const SparseVolume& volume, std::span<const
 void activate(const SparseVolume& volume, const std::vector<BrickMask>& active,
               const std::vector<BrickMask>& differing, VoxelLayer& layer) {
   const std::int32_t background = codec::codeOfValue(layer, volume.background);
-  tbb::parallel_for(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     layer.active[b] = active[b];
     layer.vacant[b] = {};
     for (int v = 0; v < kBrickVoxels; ++v) {
@@ -181,21 +197,38 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
 }
 
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
-                        RoundedSigns signs, const SimplifiedMasks* simplified) {
+                        RoundedSigns signs, const SimplifiedMasks* simplified,
+                        DecodedValues decoded) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
+  const bool halfs = decoded == DecodedValues::kHalfs;
   // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
   // bound where they are rounded to float32; the second lattice is finer and leaves room for that.
-  // A negative value near 0 that keeps its sign is up to a whole step off.
-  const double halfStep = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * bound * kMargin;
-  for (const double h : {halfStep, halfStep - roundingError(volume, bound)}) {
+  // A negative value near 0 that keeps its sign is up to a whole step off. The half that is nearest
+  // to a code's value is at most twice as far from the source's half as this value, so that the last
+  // lattice keeps the bound where values that lie on two sides of a power of 2 miss it.
+  const double side = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * kMargin;
+  const double halfStep = side * (halfs ? boundBeforeRounding(volume, bound) : bound);
+  std::vector<double> halfSteps{halfStep, halfStep - roundingError(volume, bound)};
+  if (halfs) halfSteps.push_back(0.5 * side * bound);
+  for (const double h : halfSteps) {
     if (!(h > 0.0)) break;
     VoxelLayer layer = quantised(volume, h, signs);
     if (activity != Activity::kExact)
-      activateByValue(volume, halfStep, activity, simplified, layer);
-    if (largestError(volume, layer) <= bound) return layer;
+      activateByValue(volume, side * bound, activity, simplified, layer);
+    SparseVolume made = volumeOf(layer);
+    if (halfs) roundToHalfs(made);
+    if (largestDifference(volume, made) <= bound) return layer;
   }
   return exactLayer(volume);
+}
+
+void roundToHalfs(SparseVolume& volume) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v)) values[v] = codec::nearestHalf(values[v]);
+  });
 }
 
 SparseVolume volumeOf(const VoxelLayer& layer) {
@@ -205,7 +238,7 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   volume.bricks = layer.bricks;
   volume.active = layer.active;
   volume.values = VoxelArray<float>(layer.codes.size(), layer.codes.get_allocator());
-  tbb::parallel_for(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       const std::size_t i = b * kBrickVoxels + v;
       volume.values[i] = layer.vacant[b].test(int(v)) ? layer.background
@@ -240,7 +273,7 @@ double largestOver(const SparseVolume& a, std::size_t i, const SparseVolume& b) 
 double largestOver(const SparseVolume& a, const SparseVolume& b) {
   using BrickRange = tbb::blocked_range<std::size_t>;
   const auto largest = [](double x, double y) { return std::max(x, y); };
-  return tbb::parallel_reduce(
+  return parallelReduce(
       BrickRange(0, a.brickCount()), 0.0,
       [&](const BrickRange& bricks, double found) {
         for (std::size_t i = bricks.begin(); i != bricks.end(); ++i)

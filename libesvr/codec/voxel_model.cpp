@@ -1,7 +1,5 @@
 #include "codec/voxel_model.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <span>
@@ -10,6 +8,7 @@
 
 #include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/parallel.h"
 
 namespace esvr::codec {
 namespace {
@@ -36,6 +35,7 @@ std::vector<std::int32_t> commonCodes(const VoxelLayer& layer) {
   std::unordered_map<std::int32_t, std::size_t> counts;
   std::size_t voxels = 0;
   for (std::size_t i = 0; i < layer.codes.size(); ++i) {
+    if (i % kBrickVoxels == 0) throwIfCancelled();
     if (vacantAt(layer, i)) continue;
     ++counts[layer.codes[i]];
     ++voxels;
@@ -70,8 +70,8 @@ class MirrorSearch {
     if (samples_.empty() || extent > kMaxExtent) return VoxelModel::kNoMirror;
     const std::int32_t first = extent / 2;
     std::vector<std::size_t> counts(static_cast<std::size_t>(extent));
-    tbb::parallel_for(std::size_t{0}, counts.size(),
-                      [&](std::size_t n) { counts[n] = alike(axis, first + std::int32_t(n)); });
+    parallelFor(std::size_t{0}, counts.size(),
+                [&](std::size_t n) { counts[n] = alike(axis, first + std::int32_t(n)); });
     const auto most = std::max_element(counts.begin(), counts.end());
     if (double(*most) <= kAlike * double(samples_.size())) return VoxelModel::kNoMirror;
     return first + std::int32_t(most - counts.begin());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace esvr::codec {
 namespace {
@@ -49,10 +50,34 @@ std::int32_t orderOfHalf(float v) {
   return orderOf(bits, std::signbit(v));
 }
 
+float nearestHalf(float v) {
+  constexpr float kLargest = 65504.0f, kSmallestNormal = 0x1p-14f, kSmallest = 0x1p-24f;
+  // Between 0.5 and 1, floats are as far apart as subnormal halfs. Adding this number rounds to them.
+  constexpr float kRounder = 0.75f;
+  constexpr int kDropped = kFloatMantissa - kHalfMantissa;
+  constexpr std::uint32_t kBelowTie = (1u << (kDropped - 1)) - 1u,
+                          kDroppedBits = (1u << kDropped) - 1u;
+  const float magnitude = std::abs(v);
+  if (!(magnitude < kLargest)) return std::isnan(v) ? v : std::copysign(kLargest, v);
+  float rounded = 0.0f;
+  if (magnitude < kSmallestNormal) {
+    rounded = (magnitude + kRounder) - kRounder;
+  } else {
+    const auto bits = std::bit_cast<std::uint32_t>(magnitude);
+    const std::uint32_t even = (bits >> kDropped) & 1u;
+    rounded = std::bit_cast<float>((bits + kBelowTie + even) & ~kDroppedBits);
+  }
+  if (rounded == 0.0f && v < 0.0f) rounded = kSmallest;
+  return std::copysign(std::min(rounded, kLargest), v);
+}
+
 float valueOfCode(const VoxelLayer& layer, std::int32_t n) {
   switch (layer.form) {
-    case VoxelForm::kQuantised:
-      return float(double(n) / layer.divisor);
+    case VoxelForm::kQuantised: {
+      // The code next to the largest float may stand for a larger number, which no float holds.
+      constexpr double kLargest = std::numeric_limits<float>::max();
+      return float(std::clamp(double(n) / layer.divisor, -kLargest, kLargest));
+    }
     case VoxelForm::kHalf:
       return halfAt(n);
     case VoxelForm::kPalette:

@@ -16,6 +16,10 @@ namespace esvr::codec {
 /// halfAt() of the result equals v.
 [[nodiscard]] std::int32_t orderOfHalf(float v);
 [[nodiscard]] bool inOrder(float a, float b);
+/// The half that is nearest to v, ties to the even one. A value beyond 65504 becomes 65504 with its
+/// sign, and a negative value that would become 0 becomes the negative half next to 0, so that
+/// nothing leaves the halfs or changes its side of 0. NaN remains NaN.
+[[nodiscard]] float nearestHalf(float v);
 
 /// The value of a code of a layer. A code of the form kPalette must be in the palette.
 [[nodiscard]] float valueOfCode(const VoxelLayer& layer, std::int32_t code);

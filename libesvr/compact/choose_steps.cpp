@@ -237,18 +237,35 @@ Trial search(TrialMaker& maker, const TrialGoal& goal, const QuantiserSteps& gue
   return scaleTo(maker, goal, scaled(expected.steps, goal.correction(expected, expected)));
 }
 
+/// Steps that should use up the error that rounding may add.
+QuantiserSteps firstGuess(TrialMaker& maker, double allowed) {
+  const double budget = std::max(allowed - maker.leastError(), kMinBudgetShareOfAllowed * allowed);
+  return stepsThatAdd(budget, maker.count());
+}
+
+QuantiserSteps usualSteps(TrialMaker& maker) {
+  const double added = kUsualAddedShareOfError * std::max(maker.error(), maker.negligibleError());
+  return stepsThatAdd(added, maker.count());
+}
+
 }  // namespace
 
+Trial firstStepsWithin(TrialMaker& maker, double allowed) {
+  return maker.make(firstGuess(maker, allowed));
+}
+
+Trial firstStepsFor(TrialMaker& maker, std::uint64_t bytes) {
+  return scaleTo(maker, BytesGoal(bytes, maker.count()), usualSteps(maker));
+}
+
 Trial chooseStepsWithin(TrialMaker& maker, double allowed) {
-  const double budget = std::max(allowed - maker.leastError(), kMinBudgetShareOfAllowed * allowed);
-  const QuantiserSteps guess = stepsThatAdd(budget, maker.count());
+  const QuantiserSteps guess = firstGuess(maker, allowed);
   if (maker.leastError() >= allowed) return maker.make(scaled(guess, kFinestFactor));
   return search(maker, ErrorGoal(allowed, maker.leastError()), guess);
 }
 
 Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes) {
-  const double added = kUsualAddedShareOfError * std::max(maker.error(), maker.negligibleError());
-  return search(maker, BytesGoal(bytes, maker.count()), stepsThatAdd(added, maker.count()));
+  return search(maker, BytesGoal(bytes, maker.count()), usualSteps(maker));
 }
 
 }  // namespace esvr

@@ -17,4 +17,9 @@ namespace esvr {
 /// that small, the result is the smallest one.
 [[nodiscard]] Trial chooseStepsFor(TrialMaker& maker, std::uint64_t bytes);
 
+/// The trial with the steps with which these searches begin, and that with the first steps found that
+/// keep to the bytes. With a quick maker, they take no evaluation of the ellipsoids.
+[[nodiscard]] Trial firstStepsWithin(TrialMaker& maker, double allowed);
+[[nodiscard]] Trial firstStepsFor(TrialMaker& maker, std::uint64_t bytes);
+
 }  // namespace esvr

@@ -8,6 +8,7 @@
 #include "compact/measure_layers.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 
 namespace esvr {
@@ -54,7 +55,7 @@ bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
 void requireOneKappa(const StoredGrid& grid) {
   for (const auto& chunk : grid.field.chunks)
     if (!chunk.ellipsoids.kappa.empty())
-      throw RuntimeFailure("cannot quantise grid '" + grid.descriptor.name +
+      throw RuntimeFailure("cannot quantise grid '" + shownName(grid.descriptor.name) +
                            "': its ellipsoids have kappas of their own");
 }
 
@@ -136,9 +137,35 @@ CompactResult corrected(CompactResult best, const StoredGrid& grid, const Sparse
 
 }  // namespace
 
+namespace {
+
+CompactResult compactQuickly(const StoredGrid& grid, const SparseVolume& source,
+                             const CompactOptions& options) {
+  CompactResult result{grid, {}, 0.0, 0};
+  if (grid.field.ellipsoidCount() == 0) return result;
+  TrialMaker maker(withOneThreshold(grid), {.source = source,
+                                            .box = options.box.value_or(activeBox(source)),
+                                            .device = options.device,
+                                            .peak = options.peak,
+                                            .quick = true});
+  Trial chosen = options.bytes ? firstStepsFor(maker, *options.bytes)
+                               : firstStepsWithin(maker, allowedError(maker, options));
+  result.loss =
+      maker.error() > 0.0 ? 10.0 * std::log10(maker.measure(chosen) / maker.error()) : 0.0;
+  result.grid.layerErrors.clear();
+  result.grid.field = std::move(chosen.field);
+  result.grid.quantised = std::move(chosen.quantised);
+  result.steps = chosen.steps;
+  result.bytes = chosen.bytes;
+  return result;
+}
+
+}  // namespace
+
 CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   requireOneKappa(grid);
+  if (options.quick) return compactQuickly(grid, source, options);
   CompactResult result = compactOnce(grid, source, options);
   if (!options.psnr || hasOneThreshold(result.grid)) return result;
   return corrected(std::move(result), grid, source, options);

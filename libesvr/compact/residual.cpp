@@ -5,7 +5,9 @@
 #include <iterator>
 #include <utility>
 
+#include "codec/voxel_values.h"
 #include "compact/residual_layer.h"
+#include "core/parallel.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "field/active_region.h"
@@ -46,16 +48,29 @@ std::vector<Coord> bricksOfEither(const StoredGrid& grid, const SparseVolume& so
   return all;
 }
 
+bool becomesHalfs(const StoredGrid& grid) { return grid.descriptor.valueType == ValueType::kHalf; }
+
+/// The largest error of rounding a decoded value of the grid to a half; 0 if it is not rounded.
+double roundingOf(const StoredGrid& grid, double bound) {
+  if (!becomesHalfs(grid)) return 0.0;
+  constexpr int kMantissa = 10, kLowest = -14;  // of a half: bits, smallest exponent
+  const double largest =
+      std::max(std::abs(double(grid.valueMin)), std::abs(double(grid.valueMax))) + bound;
+  return 0.5 * std::ldexp(1.0, std::max(std::ilogb(largest), kLowest) - kMantissa);
+}
+
 /// Chooses the codes of a residual that keeps a bound.
 class Bounded {
  public:
-  /// \param margin  largest margin of a brick
-  Bounded(const StoredGrid& grid, double bound, double margin)
+  /// \param margin    largest margin of a brick
+  /// \param rounding  error of rounding to halfs, below the bound
+  Bounded(const StoredGrid& grid, double bound, double margin, double rounding)
       : bound_(bound),
         background_(grid.field.background),
+        halfs_(becomesHalfs(grid)),
         byValue_(grid.topology == TopologyKind::kThreshold),
         threshold_(byValue_ ? kThresholdShare * bound : 0.0),
-        divisor_(1.0 / stepOf(byValue_, bound, margin)) {}
+        divisor_(1.0 / stepOf(byValue_, bound - rounding, margin)) {}
 
   [[nodiscard]] float threshold() const { return float(threshold_); }
   [[nodiscard]] double divisor() const { return divisor_; }
@@ -81,12 +96,22 @@ class Bounded {
     const double activity = std::abs(double(value) - background_);
     const bool mayStay = !byValue_ || activity > threshold_ - margin;
     const bool mayGo = byValue_ && activity <= threshold_ + margin;
-    return (!mayStay || std::abs(double(wanted) - value) <= bound_ - margin) &&
-           (!mayGo || mayBeBackground(wanted));
+    return (!mayStay || isNear(wanted, value, margin)) && (!mayGo || mayBeBackground(wanted));
+  }
+
+  /// True if every value within the margin of this one keeps the bound. Rounding does not change the
+  /// order of values, so that the halfs of the two ends enclose all others.
+  [[nodiscard]] bool isNear(float wanted, float value, double margin) const {
+    if (!halfs_) return std::abs(double(wanted) - value) <= bound_ - margin;
+    const auto keeps = [&](double v) {
+      return std::abs(double(wanted) - codec::nearestHalf(float(v))) <= bound_;
+    };
+    return keeps(double(value) - margin) && keeps(double(value) + margin);
   }
 
   double bound_;
   float background_;
+  bool halfs_;  ///< whether decoded values are rounded to halfs
   bool byValue_;
   double threshold_, divisor_;
 };
@@ -115,13 +140,15 @@ std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& sour
   const auto corners = bricksOfEither(grid, source);
   const auto margins = compact::marginsOf(grid.field, corners);
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());
-  if (margin > kMaxMarginShare * bound) return std::nullopt;
-  const Bounded bounded(grid, bound, margin);
+  const double rounding = roundingOf(grid, bound);
+  if (margin > kMaxMarginShare * (bound - rounding)) return std::nullopt;
+  const Bounded bounded(grid, bound, margin, rounding);
   const SparseVolume sum = compact::sumIn(grid, corners);
   const RevoxeliseOptions rule = voxelRule(grid);
   const std::vector<float> emptyBrick(kBrickVoxels, source.background);
   std::vector<BrickCodes> bricks;
   for (std::size_t b = 0; b < corners.size(); ++b) {
+    throwIfCancelled();
     const auto at = findBrick(source, brickOf(corners[b]) - brickOf(source.origin));
     BrickCodes brick{corners[b], {}};
     const BrickMask region = regionIn(rule, corners[b]).within;

@@ -1,11 +1,10 @@
 #include "compact/trial.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "core/parallel.h"
 #include "esvr/metrics.h"
 #include "format/grid_rule.h"
 #include "format/layered_section.h"
@@ -109,19 +108,35 @@ TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
       problem_(target_, target.device),
       sampleProblem_(sampleTarget_, target.device),
       field_(grid.field),
+      quick_(target.quick),
       peak_(target.peak ? *target.peak : peakOf(target.source)) {
   if (target.solvedFor) {
     sourceTarget_.emplace(IntensityTarget{target.source, target_.rule, target.box, bricks_,
                                           target_.restrictToBricks});
     sourceProblem_.emplace(*sourceTarget_, target.device);
   }
+  if (quick_) {
+    auto intensities = intensitiesOf(field_);
+    problem_.setShapes(field_);
+    error_ = leastError_ = problem_.step(intensities, 0);
+  } else {
+    solveField();
+  }
+  curvature_ = byChunk(field_, problem_.curvature());
+}
+
+/// Gives the field the best intensities, and measures its error before and after.
+void TrialMaker::solveField() {
   auto intensities = intensitiesOf(field_);
   error_ = errorOf(field_, intensities).squares;
   problem_.setShapes(field_);
   (void)problem_.solve(intensities, kFirstIterations);
   leastError_ = errorOf(field_, intensities).squares;
   setIntensities(intensities, field_);
-  curvature_ = byChunk(field_, problem_.curvature());
+}
+
+double TrialMaker::measure(const Trial& trial) {
+  return errorOf(trial.field, intensitiesOf(trial.field)).squares;
 }
 
 /// The error of a field against the source.
@@ -141,7 +156,7 @@ double TrialMaker::negligibleError() const { return squaresOf(kNegligiblePsnr); 
 /// file's order.
 void TrialMaker::quantiseChunks(Trial& trial) const {
   trial.quantised.resize(field_.chunks.size());
-  tbb::parallel_for(std::size_t{0}, field_.chunks.size(), [&](std::size_t c) {
+  parallelFor(std::size_t{0}, field_.chunks.size(), [&](std::size_t c) {
     const Ellipsoids& e = field_.chunks[c].ellipsoids;
     std::vector<std::size_t> order;
     trial.quantised[c] = quantise(e, chooseLattice(e, curvature_[c], trial.steps), order);
@@ -170,13 +185,21 @@ std::vector<Trial> TrialMaker::sample(std::span<const QuantiserSteps> steps) {
 std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps,
                                     IntensityProblem& problem) const {
   std::vector<Trial> trials(steps.size());
-  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) {
+  parallelFor(std::size_t{0}, trials.size(), [&](std::size_t k) {
     trials[k] = {steps[k], field_, {}, 0.0, 0};
     quantiseChunks(trials[k]);
   });
   // one after the other, since each solution takes all threads or the GPU
-  for (Trial& trial : trials) solveIntensities(problem, trial);
-  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t k) { countBytes(trials[k]); });
+  for (Trial& trial : trials) {
+    CancelScope::check();
+    if (!quick_) {
+      solveIntensities(problem, trial);
+      continue;
+    }
+    storeIntensities(intensitiesOf(trial.field), trial);
+    trial.error = error_;
+  }
+  parallelFor(std::size_t{0}, trials.size(), [&](std::size_t k) { countBytes(trials[k]); });
   return trials;
 }
 

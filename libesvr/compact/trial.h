@@ -31,6 +31,9 @@ struct TrialTarget {
   /// The voxels for which intensities are solved, if these are not the source's.
   const SparseVolume* solvedFor = nullptr;
   std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(source)
+  /// Trials are rounded and counted only: the intensities are not solved for, and the error of a trial
+  /// is that of the float32 field. \ref TrialMaker::measure gives the true one.
+  bool quick = false;
 };
 
 class TrialMaker {
@@ -61,11 +64,15 @@ class TrialMaker {
   /// measured on a sample of the bricks only; the bytes are those of all ellipsoids.
   [[nodiscard]] std::vector<Trial> sample(std::span<const QuantiserSteps> steps);
 
+  /// The error of a trial of a quick maker.
+  [[nodiscard]] double measure(const Trial& trial);
+
   /// The error of the first k layers for each k; the last row is the trial itself. Empty if there
   /// is only one layer.
   [[nodiscard]] std::vector<LayerError> layerErrors(const Trial& trial);
 
  private:
+  void solveField();
   void quantiseChunks(Trial& trial) const;
   [[nodiscard]] StoredError errorOf(const Field& field, std::span<const float> intensities);
   [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps,
@@ -81,6 +88,7 @@ class TrialMaker {
   std::optional<IntensityProblem> sourceProblem_;  ///< measures errors against sourceTarget_
   Field field_;  ///< float32 field with optimal intensities, from which the trials' solver starts
   std::vector<std::vector<double>> curvature_;  ///< sum of phi^2 of each ellipsoid, by chunk
+  bool quick_;
   double peak_, error_ = 0.0, leastError_ = 0.0;
 };
 

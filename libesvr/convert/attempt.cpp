@@ -30,14 +30,20 @@ FitOptions optionsFor(const Job& job, double count, FitLength length) {
   return length == FitLength::kWhole ? options : shortened(std::move(options));
 }
 
+/// PSNR of the sum over the box at the end of a fit, as the device of the fit measures it.
+double lastPsnr(const FitResult& fit) { return fit.curve.empty() ? 0.0 : fit.curve.back().psnrBox; }
+
 Attempt attempted(const Job& job, const FitOptions& options) {
-  const SparseVolume& source = job.input.source;
   Attempt result;
   result.asked = *options.count;
-  result.fit = fit(source, options);
-  result.grid =
-      makeStoredGrid(job.input.descriptor, source, std::move(result.fit.field), activityOf(job));
-  result.psnr = psnrOf(job, result.grid);
+  result.fit = fit(job.input.source, options);
+  result.grid = storedGridOf(job, result.fit);
+  const auto psnr = unlessCancelled([&]() -> std::optional<double> {
+    if (result.cancelled()) return std::nullopt;
+    return psnrOf(job, result.grid);
+  });
+  if (!psnr) result.fit.end = FitEnd::kCancelled;
+  result.psnr = psnr.value_or(lastPsnr(result.fit));
   return result;
 }
 
@@ -133,6 +139,11 @@ RoundedSigns voxelSigns(const Job& job) {
   return job.options.fit.narrowBand ? RoundedSigns::kKept : RoundedSigns::kMayChange;
 }
 
+DecodedValues decodedValues(const Job& job) {
+  return job.input.descriptor.valueType == ValueType::kHalf ? DecodedValues::kHalfs
+                                                            : DecodedValues::kFloats;
+}
+
 double psnrOf(const Job& job, const SparseVolume& volume) {
   return psnrOverBox(job.input.source, volume,
                      {.box = job.options.fit.box, .peak = job.options.fit.peak});
@@ -177,16 +188,66 @@ Attempt withBetterSigns(const ConvertInput& input, Attempt own, ConvertOptions& 
   return std::move(best);
 }
 
+bool isCancelled(const Job& job) {
+  const CancelToken* cancel = job.options.fit.cancel;
+  return cancel && cancel->cancelled();
+}
+
+StoredGrid storedGridOf(const Job& job, FitResult& fit) {
+  const auto made = [&](const ActivityOptions& activity) {
+    return makeStoredGrid(job.input.descriptor, job.input.source, fit.field, activity);
+  };
+  ActivityOptions activity = activityOf(job);
+  auto grid = unlessCancelled([&]() -> std::optional<StoredGrid> {
+    if (fit.end == FitEnd::kCancelled) return std::nullopt;
+    return made(activity);
+  });
+  if (!grid) {
+    const BestSoFar completion;
+    fit.end = FitEnd::kCancelled;
+    if (activity.activity != Activity::kExact) activity.activity = Activity::kByValue;
+    grid = made(activity);
+  }
+  fit.field = {};
+  return std::move(*grid);
+}
+
+std::uint64_t bytesOfEllipsoids(const StoredGrid& grid) {
+  const BestSoFar completion;
+  return bytesAdded(grid);
+}
+
+CompactResult compacted(const Job& job, const StoredGrid& grid, const FitResult& fit,
+                        const StorageTarget& target) {
+  const FitOptions& wanted = job.options.fit;
+  CompactOptions options{.loss = target.loss,
+                         .psnr = target.psnr,
+                         .bytes = target.bytes,
+                         .box = wanted.box,
+                         .peak = wanted.peak,
+                         .device = rateControlDevice(fit, wanted.device),
+                         .activity = activityOf(job)};
+  auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
+    if (fit.end == FitEnd::kCancelled) return std::nullopt;
+    return compactGrid(grid, job.input.source, options);
+  });
+  if (found) return std::move(*found);
+  const BestSoFar completion;
+  options.quick = true;
+  return compactGrid(grid, job.input.source, options);
+}
+
 CompactResult compacted(const Job& job, const Attempt& attempt, const StorageTarget& target) {
-  const FitOptions& fit = job.options.fit;
-  return compactGrid(attempt.grid, job.input.source,
-                     {.loss = target.loss,
-                      .psnr = target.psnr,
-                      .bytes = target.bytes,
-                      .box = fit.box,
-                      .peak = fit.peak,
-                      .device = rateControlDevice(attempt.fit, fit.device),
-                      .activity = activityOf(job)});
+  return compacted(job, attempt.grid, attempt.fit, target);
+}
+
+double psnrOf(const Job& job, const Conversion& conversion) {
+  const auto measured = unlessCancelled([&]() -> std::optional<double> {
+    if (isCancelled(job)) return std::nullopt;
+    return psnrOf(job, conversion.grid);
+  });
+  if (measured) return *measured;
+  return lastPsnr(conversion.fit) - (conversion.compact ? conversion.compact->loss : 0.0);
 }
 
 Device rateControlDevice(const FitResult& fit, const Device& device) {

@@ -27,6 +27,18 @@ struct Job {
   VoxelLimits limits{};
 };
 
+/// True if the conversion was cancelled. What it has so far is then completed in the shortest way.
+[[nodiscard]] bool isCancelled(const Job& job);
+
+/// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
+/// are found by value, since masks and the thresholds of blocks take long to choose, and the end of the
+/// fit becomes kCancelled.
+[[nodiscard]] StoredGrid storedGridOf(const Job& job, FitResult& fit);
+
+/// bytesAdded() of a grid of ellipsoids. Unlike that of voxels it takes little time, so that nothing
+/// cancels it.
+[[nodiscard]] std::uint64_t bytesOfEllipsoids(const StoredGrid& grid);
+
 /// PSNR of a volume or of a decoded grid over the box, dB.
 [[nodiscard]] double psnrOf(const Job& job, const SparseVolume& volume);
 [[nodiscard]] double psnrOf(const Job& job, const StoredGrid& grid);
@@ -48,6 +60,9 @@ struct Job {
 
 /// How voxels are rounded: with their signs if the grid is a narrow band.
 [[nodiscard]] RoundedSigns voxelSigns(const Job& job);
+
+/// Whether a reader of the grid gets halfs, as for a source that was saved as half.
+[[nodiscard]] DecodedValues decodedValues(const Job& job);
 
 /// The target of a search.
 struct PsnrTarget {
@@ -122,8 +137,16 @@ struct StorageTarget {
 /// fit was divided into chunks, because the volume may not fit into the memory of the GPU.
 [[nodiscard]] Device rateControlDevice(const FitResult& fit, const Device& device);
 
+/// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
+/// cancelled meanwhile.
+[[nodiscard]] CompactResult compacted(const Job& job, const StoredGrid& grid, const FitResult& fit,
+                                      const StorageTarget& target);
 [[nodiscard]] CompactResult compacted(const Job& job, const Attempt& attempt,
                                       const StorageTarget& target);
+
+/// The PSNR of a conversion over the box, dB: measured, or, if that is cancelled, what the fit and rate
+/// control have measured.
+[[nodiscard]] double psnrOf(const Job& job, const Conversion& conversion);
 
 /// Bytes per ellipsoid, at least 1.
 [[nodiscard]] double priceOf(const Attempt& attempt, const CompactResult& compact);

@@ -12,6 +12,7 @@
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 #include "esvr/residual.h"
 
@@ -26,9 +27,7 @@ constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
 constexpr double kPromisingRatio = 0.9;
 
 double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
-  if (!goal.relative) return goal.bound;
-  const ValueRange range = activeRange(source);
-  return goal.bound * (double(range.max) - double(range.min));
+  return goal.relative ? goal.bound * valueRangeOf(source) : goal.bound;
 }
 
 Conversion asVoxels(const Job& job, VoxelLayer layer) {
@@ -124,8 +123,7 @@ bool isPromising(const Job& job, double bound, std::uint64_t bytes, Smaller& bes
   return false;
 }
 
-/// Takes ellipsoids if they are smaller than the voxels or an option insists on them. A cancelled
-/// fit counts as one that found none, unless the option leaves no voxels to take instead.
+/// Takes ellipsoids if they are smaller than the voxels or an option insists on them.
 void tryEllipsoids(const Job& job, double bound, Smaller& best) {
   const std::uint64_t beside = bytesBesideVoxels(job.input);
   const std::uint64_t bytes = (best.choice.voxels->bytes - beside) / kEllipsoidBytesDivisor;
@@ -133,13 +131,19 @@ void tryEllipsoids(const Job& job, double bound, Smaller& best) {
     if (!best.insists && !isPromising(job, bound, bytes, best)) return std::nullopt;
     return withEllipsoids(job, bound, beside + bytes);
   };
-  auto found = best.insists ? fitted() : unlessCancelled(fitted);
-  if (found) best.take(std::move(*found));
+  if (auto found = fitted()) best.take(std::move(*found));
 }
 
+/// A cancellation counts as finding none, unless an option leaves no voxels to take instead.
 void tryTimed(const Job& job, double bound, Smaller& best) {
   best.residual.tried = true;
-  best.residual.seconds = secondsOf([&] { tryEllipsoids(job, bound, best); });
+  best.residual.seconds = secondsOf([&] {
+    const auto tried = [&] {
+      tryEllipsoids(job, bound, best);
+      return true;
+    };
+    (void)(best.insists ? tried() : unlessCancelled(tried));
+  });
 }
 
 }  // namespace
@@ -153,8 +157,9 @@ std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
 Conversion convertLossless(const Job& job) {
   if (job.input.descriptor.valueType == ValueType::kDouble)
     throw UsageError(
-        "grid '" + job.input.descriptor.name +
-        "' has values of type double, which are read as float32; a lossless file cannot hold them");
+        "grid '" + shownName(job.input.descriptor.name) +
+        "' has values of type double, which are read as float32; a lossless grid cannot hold them; "
+        "choose a bound or a PSNR instead");
   return asVoxels(job, exactLayer(job.input.source));
 }
 
@@ -162,16 +167,21 @@ Conversion convertWithin(const Job& job, const BoundGoal& goal) {
   const SparseVolume& source = job.input.source;
   const double bound = absoluteBound(goal, source);
   if (bound == 0.0) return asVoxels(job, exactLayer(source));
-  Conversion voxels = asVoxels(
-      job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job), job.input.simplified));
+  Conversion voxels = asVoxels(job, boundedLayer(source, bound, voxelActivity(job), voxelSigns(job),
+                                                 job.input.simplified, decodedValues(job)));
   const bool insists = job.options.representation == Representation::kEllipsoids;
   if (isNarrowBand(job.input.descriptor, source) && !insists) return voxels;
   Smaller best{std::move(voxels), {}, insists};
-  best.choice.voxels = Candidate{bytesAdded(best.conversion.grid)};
+  const auto bytes =
+      unlessCancelled([&] { return std::optional(bytesAdded(best.conversion.grid)); });
+  if (!bytes && insists) throw Cancelled();
+  if (!bytes) return std::move(best.conversion);
+  best.choice.voxels = Candidate{*bytes};
   if (job.options.representation != Representation::kVoxels) tryTimed(job, bound, best);
   if (insists && !best.hasEllipsoids())
-    throw UsageError("grid '" + job.input.descriptor.name +
-                     "' has no ellipsoids with a residual that keep the bound");
+    throw UsageError("grid '" + shownName(job.input.descriptor.name) +
+                     "' has no ellipsoids with a residual that keep the bound; store voxels, or "
+                     "allow a larger error");
   best.record();
   return std::move(best.conversion);
 }

@@ -13,6 +13,7 @@
 #include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 
 namespace esvr::convert {
 namespace {
@@ -36,7 +37,7 @@ Candidate record(const VoxelCandidate& voxels) {
 }
 
 Candidate record(const Job& job, const Conversion& ellipsoids, double seconds) {
-  return {bytesAdded(ellipsoids.grid), psnrOf(job, ellipsoids.grid), false, seconds};
+  return {bytesOfEllipsoids(ellipsoids.grid), psnrOf(job, ellipsoids), false, seconds};
 }
 
 Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEnd end) {
@@ -45,6 +46,14 @@ Conversion asConversion(VoxelCandidate voxels, const ChoiceRecord& choice, FitEn
   conversion.fit.end = end;
   conversion.choice = choice;
   conversion.decisions.plateau = voxels.plateau;
+  return conversion;
+}
+
+/// A conversion to the voxels that a cancelled search has found.
+Conversion asConversion(VoxelCandidate voxels) {
+  Conversion conversion;
+  conversion.grid = std::move(voxels.grid);
+  conversion.fit.end = FitEnd::kCancelled;
   return conversion;
 }
 
@@ -63,8 +72,8 @@ void recordRejected(const Decision& plateau, const ChoiceRecord& choice, Convers
 }
 
 UsageError tooSmall(const Job& job, std::uint64_t bytes, const std::string& needs) {
-  return UsageError("grid '" + job.input.descriptor.name + "' " + needs + "; the size allows " +
-                    std::to_string(bytes));
+  return UsageError("grid '" + shownName(job.input.descriptor.name) + "' " + needs +
+                    "; the size allows " + std::to_string(bytes));
 }
 
 UsageError tooSmall(const Job& job, std::uint64_t bytes, std::uint64_t needed) {
@@ -79,7 +88,7 @@ Conversion ellipsoidsToSize(const Job& job, std::uint64_t bytes) {
 
 /// Voxels that reach a PSNR, and the search for ellipsoids that do.
 struct PsnrCandidates {
-  VoxelCandidate voxels;
+  VoxelCandidate voxels;  ///< without figures if a cancellation ended their search
   RestOfSearch search;
   double seconds = 0.0;  ///< wall-clock seconds that `search` took before the voxels were known
 };
@@ -102,6 +111,16 @@ Conversion smallerOf(const Job& job, const PsnrTarget& target, PsnrCandidates ca
   return asConversion(std::move(voxels), choice, FitEnd::kPsnrReached);
 }
 
+/// True if exact voxels take at most a number of bytes. If finding out is cancelled, the ellipsoids that
+/// are there are taken.
+bool takesUnlessCancelled(const Job& job, ExactVoxels& exact, double bytes) {
+  const auto takes = unlessCancelled([&]() -> std::optional<bool> {
+    if (isCancelled(job)) return std::nullopt;
+    return exact.takeAtMost(bytes);
+  });
+  return takes.value_or(false);
+}
+
 /// The smaller of exact voxels and ellipsoids that reach the PSNR. If the search was cancelled, its
 /// ellipsoids need not reach the PSNR.
 Conversion smallerOfExactAnd(const Job& job, double psnr) {
@@ -113,7 +132,7 @@ Conversion smallerOfExactAnd(const Job& job, double psnr) {
   if (ellipsoids) {
     other = record(job, *ellipsoids, seconds);
     const bool ended = other.psnr >= psnr || ellipsoids->fit.end == FitEnd::kCancelled;
-    if (ended && !exact.takeAtMost(double(other.bytes))) {
+    if (ended && !takesUnlessCancelled(job, exact, double(other.bytes))) {
       ellipsoids->choice = ChoiceRecord{exact.figures(), other};
       return std::move(*ellipsoids);
     }
@@ -141,12 +160,13 @@ class BetterOfSize {
 
   Conversion run() {
     const auto search = fitted(seconds_, [&] { return startSizeSearch(job_, bytes_); });
-    if (!search.rest) return cancelled();
+    if (!search.rest) throw Cancelled();
     const double least = search.expected - kUncertainty;
-    searchVoxels(least);
+    searchVoxelsUnlessCancelled(least);
     ellipsoids_ = fitted(seconds_, [&] { return search.rest(psnrOfVoxels()); });
     if (ellipsoids_.conversion) figures_ = record(job_, *ellipsoids_.conversion, seconds_);
-    if (voxels_.tooLarge && !suffices(least)) searchVoxels(figures_ ? *figures_->psnr : kAnyPsnr);
+    if (voxels_.tooLarge && !suffices(least))
+      searchVoxelsUnlessCancelled(figures_ ? *figures_->psnr : kAnyPsnr);
     return better();
   }
 
@@ -159,6 +179,14 @@ class BetterOfSize {
     voxels_.seconds += before;
   }
 
+  /// Without a result, the ellipsoids are taken.
+  void searchVoxelsUnlessCancelled(double least) {
+    (void)unlessCancelled([&] {
+      searchVoxels(least);
+      return true;
+    });
+  }
+
   [[nodiscard]] std::optional<double> psnrOfVoxels() const {
     return voxels_.found ? std::optional(voxels_.found->psnr) : std::nullopt;
   }
@@ -166,15 +194,9 @@ class BetterOfSize {
   /// True if the ellipsoids have a PSNR, or if they were cancelled, so that nothing should be tried
   /// after them.
   [[nodiscard]] bool suffices(double psnr) const {
+    if (isCancelled(job_)) return true;
     if (!figures_) return false;
     return *figures_->psnr >= psnr || ellipsoids_.conversion->fit.end == FitEnd::kCancelled;
-  }
-
-  /// Voxels, since there is no ellipsoid.
-  Conversion cancelled() {
-    searchVoxels(kAnyPsnr);
-    if (!voxels_.found) throw Cancelled();
-    return voxelsAlone(std::move(*voxels_.found));
   }
 
   [[nodiscard]] ChoiceRecord choice() const {
@@ -192,6 +214,7 @@ class BetterOfSize {
       recordRejected(voxels_.plateau, record, *ellipsoids_.conversion);
       return std::move(*ellipsoids_.conversion);
     }
+    if (!voxels_.found && isCancelled(job_)) throw Cancelled();
     if (!voxels_.found) throw tooSmall(job_, bytes_, ellipsoids_.needed);
     return asConversion(std::move(*voxels_.found), record, FitEnd::kScheduleDone);
   }
@@ -226,6 +249,15 @@ bool fitsBesideTheCoder(const Job& job) {
 /// is needed.
 constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
 
+/// What was found before a cancellation: voxels that reach the PSNR, or a short fit.
+Conversion bestSoFar(PsnrCandidates candidates) {
+  if (candidates.voxels.grid.voxels) return asConversion(std::move(candidates.voxels));
+  if (!candidates.search) throw Cancelled();
+  auto found = candidates.search(std::nullopt).conversion;
+  if (!found) throw Cancelled();
+  return std::move(*found);
+}
+
 /// Makes the voxels, and on a GPU the short fits beside them. A search that was cancelled before it
 /// had a fit finds nothing.
 PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
@@ -237,13 +269,15 @@ PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
     return made;
   }
   CancelToken notNeeded(job.options.fit.cancel);
-  auto coder = std::async(std::launch::async, [&] {
+  auto coder = std::async(std::launch::async, [&, token = CancelScope::token()] {
+    const CancelScope scope(token);
     VoxelCandidate voxels = code();
     if (voxels.bytes < target.smallEnough) notNeeded.cancel();
     return voxels;
   });
   made.search = fitted(made.seconds, [&] { return startPsnrSearch(job, target.psnr, notNeeded); });
-  made.voxels = coder.get();
+  if (auto voxels = unlessCancelled([&] { return std::optional(coder.get()); }))
+    made.voxels = std::move(*voxels);
   if (!made.search) made.search = [](auto) { return PsnrResult{}; };
   return made;
 }
@@ -259,6 +293,7 @@ Conversion convertToPsnr(const Job& job, const PsnrTarget& target) {
   if (wanted == Representation::kAuto && isLarge(job)) return smallerOfExactAnd(job, target.psnr);
   auto found = wanted == Representation::kAuto ? psnrCandidates(job, target)
                                                : PsnrCandidates{voxelsForPsnr(job, target), {}};
+  if (isCancelled(job)) return bestSoFar(std::move(found));
   if (found.search && found.voxels.bytes >= target.smallEnough)
     return smallerOf(job, target, std::move(found));
   const ChoiceRecord choice{record(found.voxels), {}};
@@ -281,16 +316,22 @@ Conversion unlessExactIsSmaller(const Job& job, const std::function<Conversion()
   std::optional<Conversion> fitted;
   double seconds = 0.0;
   if (fitsBesideTheCoder(job)) {
-    auto coder = std::async(std::launch::async, [&] { return exactVoxels(job); });
+    auto coder = std::async(std::launch::async, [&, token = CancelScope::token()] {
+      const CancelScope scope(token);
+      return exactVoxels(job);
+    });
     fitted = addSeconds(seconds, fit);
-    exact.set(coder.get());
+    auto coded = unlessCancelled([&] { return std::optional(coder.get()); });
+    if (!coded) return std::move(*fitted);
+    exact.set(std::move(*coded));
   }
   Candidate ellipsoids{std::uint64_t(kBytesPerEllipsoid * count), {}, true};
   if (fitted || !exact.takeAtMost(kMinBytesPerEllipsoid * count)) {
     if (!fitted) fitted = addSeconds(seconds, fit);
     // Their PSNR would take a decoding.
-    ellipsoids = {bytesAdded(fitted->grid), {}, false, seconds};
-    if (!exact.takeAtMost(double(ellipsoids.bytes))) {
+    ellipsoids = {bytesOfEllipsoids(fitted->grid), {}, false, seconds};
+    if (!takesUnlessCancelled(job, exact, double(ellipsoids.bytes))) {
+      if (isCancelled(job)) return std::move(*fitted);
       fitted->choice = ChoiceRecord{exact.figures(), ellipsoids};
       return std::move(*fitted);
     }

@@ -1,4 +1,3 @@
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -9,6 +8,7 @@
 
 #include "codec/brick_order.h"
 #include "codec/voxel_values.h"
+#include "core/parallel.h"
 #include "esvr/voxel_reference.h"
 #include "format/related_voxels.h"
 
@@ -155,7 +155,7 @@ std::vector<AlikeGrid> mostAlike(std::span<const StoredGrid> grids, const VoxelL
                                  std::span<const std::size_t> candidates) {
   std::vector<AlikeGrid> found(candidates.size());
   const SparseVolume volume = volumeOf(sample);
-  tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t c) {
+  parallelFor(std::size_t{0}, candidates.size(), [&](std::size_t c) {
     const auto& voxels = grids[candidates[c]].voxels;
     if (!voxels) return;
     found[c].part = partNear(*voxels, sample);
@@ -178,7 +178,7 @@ VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t gr
   std::vector<ReferenceTrial> trials(1);
   for (const AlikeGrid& candidate : alike)
     for (const VoxelReference& map : candidate.maps) trials.push_back({map, &candidate.part});
-  tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t t) {
+  parallelFor(std::size_t{0}, trials.size(), [&](std::size_t t) {
     if (const auto content = format::putRelated(sample, trials[t].reference, trials[t].of))
       trials[t].bytes = content->size();
   });

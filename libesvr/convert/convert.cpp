@@ -1,5 +1,6 @@
 #include "esvr/convert.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,9 +12,11 @@
 #include "convert/narrow_band.h"
 #include "convert/preset.h"
 #include "convert/summable.h"
+#include "convert/unless_cancelled.h"
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 #include "format/mask_section.h"
 
@@ -25,23 +28,16 @@ using convert::Job;
 /// Stores a fit in the form that the options determine.
 Conversion stored(const Job& job, FitResult fit, const CommonFitOptions& options) {
   const StorageOptions& storage = job.options.storage;
-  const ActivityOptions activity = convert::activityOf(job);
-  StoredGrid grid =
-      makeStoredGrid(job.input.descriptor, job.input.source, std::move(fit.field), activity);
+  StoredGrid grid = convert::storedGridOf(job, fit);
   grid.curve = withoutTimes(fit.curve);
-  Conversion conversion;
   if (storage.form == Storage::kFloat32) {
+    Conversion conversion;
     conversion.fit = std::move(fit);
     conversion.grid = std::move(grid);
     return conversion;
   }
-  CompactResult compact = compactGrid(grid, job.input.source,
-                                      {.loss = storage.loss,
-                                       .psnr = options.psnr,
-                                       .box = options.box,
-                                       .peak = options.peak,
-                                       .device = convert::rateControlDevice(fit, options.device),
-                                       .activity = activity});
+  CompactResult compact =
+      convert::compacted(job, grid, fit, {.loss = storage.loss, .psnr = options.psnr});
   return convert::conversionOf(std::move(fit), std::move(compact));
 }
 
@@ -75,7 +71,8 @@ class Converter {
   Job job_;
 };
 
-/// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file.
+/// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file. A
+/// cancelled conversion keeps the grid that is there.
 /// \param previous  the grid of the previous frame; null: the grid stands alone
 StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
                             const VoxelMemory& memory) {
@@ -83,15 +80,19 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
   file.grids.push_back(std::move(grid));
   if (previous) before.grids.push_back(*previous);
   const EsvrFile* const frame = previous ? &before : nullptr;
-  const auto bytes = encodeFrame(file, frame);
-  return std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front());
+  auto read = convert::unlessCancelled([&] {
+    const auto bytes = encodeFrame(file, frame);
+    return std::optional(
+        std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front()));
+  });
+  return read ? std::move(*read) : std::move(file.grids.front());
 }
 
 /// Checks the decoded grid against the bound.
 void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
   const double error = largestDifference(input.source, decoded);
   if (error > bound)
-    throw RuntimeFailure("grid '" + input.descriptor.name + "': an error of " +
+    throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " +
                          std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
 }
 
@@ -100,6 +101,7 @@ void requirePromises(const Job& job, const StoredGrid& grid) {
   const SparseVolume& source = job.input.source;
   const auto bound = convert::boundOf(job.options.goal, source);
   if (!bound && !job.options.fit.narrowBand) return;
+  const BestSoFar completion;  // no grid is returned that was not checked
   const SparseVolume decoded = decodeGrid(grid, {.memory = memoryOf(source)});
   if (bound) requireBound(job.input, decoded, *bound);
   if (job.options.fit.narrowBand) convert::requireSigns(job.input, decoded);
@@ -118,7 +120,8 @@ void requirePossible(const ConvertOptions& options) {
 }
 
 [[noreturn]] void refuseSums(const ConvertInput& input, Coord tooLarge) {
-  throw BadInput("grid '" + input.descriptor.name + "': the value at " + toString(tooLarge) +
+  throw BadInput("grid '" + shownName(input.descriptor.name) + "': the value at " +
+                 toString(tooLarge) +
                  " is too large for a sum of ellipsoids in float32; store voxels, with a PSNR, a "
                  "size, a bound or lossless");
 }
@@ -169,6 +172,70 @@ std::vector<BrickMask> expectedMasks(const SparseVolume& source, const StoredGri
   return format::movedMask(maskOf(source), maskOf(before));
 }
 
+/// The mean of the active values, within their range.
+float meanOf(const SparseVolume& volume, const ValueRange& range) {
+  double sum = 0.0, count = 0.0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto values = volume.brickValues(b);
+    double ofBrick = 0.0;
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v)) ofBrick += values[std::size_t(v)];
+    sum += ofBrick, count += volume.active[b].count();
+  }
+  return std::clamp(float(sum / count), range.min, range.max);
+}
+
+/// True if all inactive voxels have the background.
+bool isUniformOutside(const SparseVolume& volume) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v) && volume.brickValues(b)[std::size_t(v)] != volume.background)
+        return false;
+  return true;
+}
+
+/// The background to which the values of a volume are stored if its own is far from them: that of
+/// the previous frame if it is among them, or else their mean. Nothing if its own will do.
+std::optional<float> nearBackground(const ConvertInput& input, const ConvertOptions& options) {
+  const SparseVolume& source = input.source;
+  if (std::holds_alternative<LosslessGoal>(options.goal)) return std::nullopt;
+  const ValueRange range = activeRange(source);
+  if (!spanOf(range, source.background).farBackground || !isUniformOutside(source) ||
+      isNarrowBand(input.descriptor, source))
+    return std::nullopt;
+  if (const StoredGrid* previous = options.previous; previous && previous->farBackground) {
+    const float before = previous->field.background;
+    if (range.min <= before && before <= range.max) return before;
+  }
+  return meanOf(source, range);
+}
+
+/// Converts a volume whose background is far from its values relative to a background among them.
+/// The step from one to the other at the border of the active voxels would otherwise take all
+/// ellipsoids, and sums in float32 would lose the differences of the values. The exact mask is stored,
+/// since a voxel with the wrong state would have a wrong value altogether.
+Conversion convertNear(const ConvertInput& given, const ConvertOptions& options, float background) {
+  GridDescriptor descriptor = given.descriptor;
+  descriptor.background = background;
+  SparseVolume source = given.source;
+  setBackground(background, source);
+  ConvertOptions own = options;
+  own.storage.activity = Activity::kExact;
+  StoredGrid before;  // the previous frame, as it is without its far background
+  if (own.previous && own.previous->farBackground && own.previous->field.background == background) {
+    before = *own.previous;
+    before.descriptor.background = background;
+    before.farBackground = false;
+    own.previous = &before;
+  } else {
+    own.previous = nullptr;
+  }
+  Conversion conversion = convertVolume({descriptor, source}, own);
+  conversion.grid.descriptor = given.descriptor;
+  conversion.grid.farBackground = true;
+  return conversion;
+}
+
 }  // namespace
 
 double presetPsnr(Preset preset) {
@@ -185,12 +252,18 @@ double presetPsnr(Preset preset) {
 
 Conversion convertVolume(const ConvertInput& given, const ConvertOptions& options) {
   requirePossible(options);
+  const CancelScope scope(CancelScope::orToken(options.fit.cancel));
+  CancelScope::check();
+  if (const auto background = nearBackground(given, options))
+    return convertNear(given, options, *background);
+  ConvertOptions own = options;
+  if (own.previous && own.previous->farBackground) own.previous = nullptr;
   SimplifiedMasks::MakeExpected expected;
-  if (options.previous) expected = [&] { return expectedMasks(given.source, *options.previous); };
+  if (own.previous) expected = [&] { return expectedMasks(given.source, *own.previous); };
   const SimplifiedMasks masks(given.source, std::move(expected));  // all attempts share them
   const ConvertInput input{given.descriptor, given.source,
                            given.simplified ? given.simplified : &masks};
-  ConvertOptions own = options;
+  own.fit.cancel = CancelScope::token();
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
   if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
   if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
@@ -201,7 +274,9 @@ Conversion convertVolume(const ConvertInput& given, const ConvertOptions& option
   };
   Conversion conversion = own.fit.narrowBand ? convert::convertNarrowBand({input, own}, convertTo)
                                              : convertTo({input, own});
-  conversion.smallerExactBytes = smallerExactBytes({input, own}, conversion.grid);
+  conversion.smallerExactBytes = convert::unlessCancelled([&] {
+    return smallerExactBytes({input, own}, conversion.grid);
+  });
   conversion.grid =
       throughTheFormat(std::move(conversion.grid), own.previous, memoryOf(input.source));
   requirePromises({input, own}, conversion.grid);
@@ -215,12 +290,14 @@ PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions&
         "a k for each ellipsoid needs float32 storage; compact storage has one edge for all");
   if (isNarrowBand(input.descriptor, input.source))
     throw UsageError(
-        "grid '" + input.descriptor.name +
+        "grid '" + shownName(input.descriptor.name) +
         "' is a level set; the paper's method cannot fit it, because its loss compares windows "
         "that a narrow band does not fill");
   if (const auto tooLarge = convert::tooLargeForSums(input.source)) refuseSums(input, *tooLarge);
+  const CancelScope scope(CancelScope::orToken(options.cancel));
   PaperFitResult made = fitByPaper(input.source, options);
   ConvertOptions own;
+  static_cast<CommonFitOptions&>(own.fit) = options;
   own.storage = storage;
   Conversion conversion = stored({input, own}, std::move(made.fit), options);
   conversion.grid = throughTheFormat(std::move(conversion.grid), nullptr, memoryOf(input.source));

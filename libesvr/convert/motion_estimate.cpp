@@ -1,13 +1,12 @@
 #include "convert/motion_estimate.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
 
 #include "core/axes.h"
+#include "core/parallel.h"
 
 namespace esvr::convert {
 namespace {
@@ -162,13 +161,12 @@ class FramePair {
 
   void improve() {
     std::vector<Normal> normals(bricks_.size());
-    tbb::parallel_for(std::size_t{0}, bricks_.size(),
-                      [&](std::size_t b) { normals[b] = normalOf(b); });
+    parallelFor(std::size_t{0}, bricks_.size(), [&](std::size_t b) { normals[b] = normalOf(b); });
     double trace = 0.0;
     for (const Normal& n : normals) trace += n.trace();
     const double damping =
         std::max(kDamping * trace / double(std::max<std::size_t>(bricks_.size(), 1)), 1e-300);
-    tbb::parallel_for(std::size_t{0}, bricks_.size(), [&](std::size_t b) {
+    parallelFor(std::size_t{0}, bricks_.size(), [&](std::size_t b) {
       const Vector3 change = window(normals, b).solve(damping);
       for (std::size_t a = 0; a < 3; ++a)
         motions_[b][a] += std::clamp(change[a], -kLargestChange, kLargestChange);

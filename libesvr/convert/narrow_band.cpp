@@ -6,8 +6,10 @@
 #include <variant>
 
 #include "convert/exact_voxels.h"
+#include "convert/unless_cancelled.h"
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "esvr/residual.h"
 #include "esvr/sign_errors.h"
 
@@ -20,8 +22,14 @@ constexpr int kMaxFitsForSize = 4;
 constexpr double kRoomFactor = 1.2;
 
 Conversion corrected(const Job& job, Conversion conversion) {
-  if (!conversion.grid.voxels && !conversion.grid.residual)
-    conversion.grid = withSigns(std::move(conversion.grid), job.input.source);
+  if (conversion.grid.voxels || conversion.grid.residual) return conversion;
+  auto grid =
+      unlessCancelled([&] { return std::optional(withSigns(conversion.grid, job.input.source)); });
+  if (!grid) {  // without these signs, the ellipsoids of a band are of no use
+    const BestSoFar completion;
+    grid = withSigns(std::move(conversion.grid), job.input.source);
+  }
+  conversion.grid = std::move(*grid);
   return conversion;
 }
 
@@ -66,13 +74,13 @@ std::optional<Conversion> bandAsVoxelsOfSize(const Job& job, const ConvertTo& co
 
 Conversion bandToSize(const Job& job, std::uint64_t bytes, const ConvertTo& convertTo) {
   Conversion made = corrected(job, convertTo(job));
-  if (bytesAdded(made.grid) <= bytes) return made;
+  if (bytesOfEllipsoids(made.grid) <= bytes) return made;
   if (auto fitted = withRoomForSigns(job, bytes, std::move(made), convertTo))
     return std::move(*fitted);
   const bool mayBeVoxels = mayStoreVoxels(job);
   if (mayBeVoxels)
     if (auto voxels = bandAsVoxelsOfSize(job, convertTo)) return std::move(*voxels);
-  throw UsageError("grid '" + job.input.descriptor.name +
+  throw UsageError("grid '" + shownName(job.input.descriptor.name) +
                    "': ellipsoids and the residual that corrects the signs of the level set do not "
                    "fit into " +
                    std::to_string(bytes) + " bytes" + (mayBeVoxels ? ", and voxels neither" : ""));
@@ -91,12 +99,16 @@ Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
     return bandToSize(job, size->bytes, convertTo);
   Conversion made = corrected(job, convertTo(job));
-  return voxelsAreSmaller(job, made) ? bandAsVoxels(job, convertTo) : std::move(made);
+  auto smaller = unlessCancelled([&]() -> std::optional<Conversion> {
+    if (isCancelled(job) || !voxelsAreSmaller(job, made)) return std::nullopt;
+    return bandAsVoxels(job, convertTo);
+  });
+  return smaller ? std::move(*smaller) : std::move(made);
 }
 
 void requireSigns(const ConvertInput& input, const SparseVolume& decoded) {
   const SignErrors errors = compareSigns(input.source, decoded);
-  const std::string grid = "grid '" + input.descriptor.name + "': ";
+  const std::string grid = "grid '" + shownName(input.descriptor.name) + "': ";
   if (errors.first)
     throw RuntimeFailure(grid + std::to_string(errors.voxels) +
                          " voxels are on the wrong side of the surface, for example voxel " +

@@ -19,6 +19,9 @@ constexpr double kMaxGrowth = 8.0;            // largest factor of the number be
 constexpr double kNear = 1.3;  // factor of the number up to which a short fit is extrapolated
 constexpr double kMaxContinued = 1.5;  // largest growth of the number by a continued fit
 constexpr std::size_t kMaxFits = 4;    // the search continues if none reached the PSNR
+// Smallest growth of the number of such a further fit. A PSNR that is missed, by however little, asks
+// for more; with less, the fits would tend to a number and never end.
+constexpr double kMinGrowth = 1.01;
 
 /// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
 /// the size hardly differs.
@@ -57,7 +60,7 @@ class PsnrSearch {
     if (below_ && !draft.cancelled()) {
       const CompactResult compact = compacted(job_, draft, {});
       const double price = priceOf(draft, compact) / kShortFitPrice;
-      const double besides = double(bytesAdded(compact.grid) - compact.bytes);
+      const double besides = double(bytesOfEllipsoids(compact.grid) - compact.bytes);
       expected = std::uint64_t(besides + price * neededCount(draft, aim() - kShortFitBehind));
       if (besides + price * neededCount(draft, aim() - kShortFitBehind - kUncertainty) >
           double(*below_))
@@ -130,7 +133,20 @@ class PsnrSearch {
       attempts_.push_back(std::move(*found));
       if (attempts_.back().cancelled() || goodEnough(attempts_.back())) break;
       count = nextCount();
-    } while (attempts_.size() < kMaxFits || !anyReached());
+    } while (mayImprove(count));
+  }
+
+  /// True if a fit of this number of ellipsoids may be better than those before it. A fit of a number
+  /// that was asked for is the same again, and further fits are made only as long as they grow.
+  [[nodiscard]] bool mayImprove(double count) const {
+    const auto wanted = std::size_t(std::max(std::floor(capped(count)), 1.0));
+    std::size_t most = 0;
+    for (const Attempt& a : attempts_) {
+      if (a.asked == wanted) return false;
+      most = std::max(most, a.asked);
+    }
+    if (attempts_.size() < kMaxFits) return true;
+    return !anyReached() && double(wanted) >= kMinGrowth * double(most);
   }
 
   [[nodiscard]] double aim() const { return psnr_ + margin_.aim; }
@@ -148,6 +164,7 @@ class PsnrSearch {
 
   [[nodiscard]] bool goodEnough(const Attempt& a) const {
     const bool allThereIs =
+        a.fit.deviceFull ||  // the device holds no more ellipsoids
         a.asked >= std::min<std::uint64_t>(maxCount_, activeVoxelCount(job_.input.source));
     return nearAim(a) || (a.psnr < psnr_ + margin_.min && allThereIs);
   }
@@ -221,7 +238,7 @@ class PsnrSearch {
     for (std::size_t i = 0; i < attempts_.size(); ++i) {
       if (!candidates[i]) continue;
       Conversion now = marked(std::move(attempts_[i]), FitEnd::kPsnrReached);
-      const std::uint64_t bytes = bytesAdded(now.grid);
+      const std::uint64_t bytes = bytesOfEllipsoids(now.grid);
       if (smallest && bytes >= fewest) continue;
       smallest = std::move(now);
       fewest = bytes;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <utility>
 
+#include "convert/unless_cancelled.h"
 #include "esvr/grid_coding.h"
 #include "format/layout.h"
 
@@ -24,7 +25,7 @@ std::uint64_t paddingOf(const StoredGrid& grid) {
 
 /// Bytes that a grid adds to a file besides its ellipsoids, including padding.
 std::uint64_t bytesBesides(const CompactResult& compact) {
-  return bytesAdded(compact.grid) - compact.bytes + paddingOf(compact.grid);
+  return bytesOfEllipsoids(compact.grid) - compact.bytes + paddingOf(compact.grid);
 }
 
 class SizeSearch {
@@ -54,7 +55,11 @@ class SizeSearch {
     double each = priceOf(last, first) / kShortFitPrice;
     for (int repairs = 0; !last.cancelled(); ++repairs) {
       const std::uint64_t before = left_;
-      last = attempt(job_, double(before) / each, FitLength::kWhole);
+      auto fitted = unlessCancelled([&]() -> std::optional<Attempt> {
+        return attempt(job_, double(before) / each, FitLength::kWhole);
+      });
+      if (!fitted) break;  // the fit before is the best so far
+      last = std::move(*fitted);
       CompactResult now = filled(last);
       if (besides_ >= bytes_) return refused();
       const bool isLast = repairs + 1 >= kMaxRepairs;
@@ -65,7 +70,9 @@ class SizeSearch {
       if (!fits && last.asked == 1) return {std::nullopt, besides_ + now.bytes, expected};
       each = std::max(priceOf(last, compactFor(last, {})), kRepairFactor * each);
     }
+    last.fit.end = FitEnd::kCancelled;
     CompactResult compact = compactFor(last, {.bytes = left_});
+    if (compact.bytes > left_) throw Cancelled();  // nothing that keeps to the size is there
     return {stored(std::move(last.fit), std::move(compact)), 0, expected};
   }
 

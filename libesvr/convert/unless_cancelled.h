@@ -5,7 +5,7 @@
 
 namespace esvr::convert {
 
-/// The result of `work`; an empty one if a fit in it was cancelled before it had an ellipsoid.
+/// The result of `work`; an empty one if it was cancelled before it had one.
 template <class Work>
 [[nodiscard]] auto unlessCancelled(const Work& work) -> decltype(work()) try {
   return work();

@@ -1,5 +1,3 @@
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -7,7 +5,11 @@
 #include <limits>
 #include <utility>
 
+#include "convert/unless_cancelled.h"
 #include "convert/voxel_trials.h"
+#include "esvr/grid_coding.h"
+
+#include "core/parallel.h"
 
 namespace esvr::convert {
 namespace {
@@ -30,23 +32,35 @@ class VoxelPsnrSearch {
   VoxelPsnrSearch(const Job& job, double psnr) : job_(job), trials_(job), psnr_(psnr) {}
 
   /// \param smallEnough  bytes below which nothing further is tried
+  /// \return if the search is cancelled, the first voxels that reach the PSNR, without their bytes
   VoxelCandidate run(std::uint64_t smallEnough) const {
     if (!trials_.hasRange()) return exactVoxels(job_);
     auto plain = trials_.nearestFor(psnr_);
     if (!plain) return exactVoxels(job_);
-    const double bound = plain->bound;
     if (job_.options.previous) return predicted(std::move(*plain));
+    if (auto found = unlessCancelled([&] { return std::optional(smallest(*plain, smallEnough)); }))
+      return std::move(*found);
+    VoxelCandidate best;  // what a file takes for them would take long to find out
+    best.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(plain->layer));
+    best.psnr = plain->psnr;
+    return best;
+  }
+
+ private:
+  /// \param plain  voxels without thrift that reach the PSNR
+  [[nodiscard]] VoxelCandidate smallest(const Trial& plain, std::uint64_t smallEnough) const {
+    const double bound = plain.bound;
     VoxelCandidate best;
     tbb::task_arena arena(trials_.trialsAtOnce());
-    arena.execute([&] {
-      best = exactUnless(std::move(*plain));
+    arena.execute([&, token = CancelScope::token()] {
+      const CancelScope scope(token);
+      best = exactUnless(plain);
       if (best.bytes >= smallEnough) best = furtherTrials(bound, std::move(best));
     });
     if (!best.plateau.tried) best.plateau.seconds = trials_.plateauSeconds();
     return best;
   }
 
- private:
   [[nodiscard]] VoxelCandidate stored(Trial trial) const {
     return candidateOf(job_, std::move(trial.layer), trial.psnr);
   }
@@ -70,8 +84,7 @@ class VoxelPsnrSearch {
   /// Exact voxels, unless the trial is smaller.
   [[nodiscard]] VoxelCandidate exactUnless(Trial trial) const {
     VoxelCandidate exact, rounded;
-    tbb::parallel_invoke([&] { exact = exactVoxels(job_); },
-                         [&] { rounded = stored(std::move(trial)); });
+    parallelInvoke([&] { exact = exactVoxels(job_); }, [&] { rounded = stored(std::move(trial)); });
     return isSmaller(rounded, exact) ? std::move(rounded) : std::move(exact);
   }
 
@@ -79,12 +92,11 @@ class VoxelPsnrSearch {
   [[nodiscard]] VoxelCandidate furtherTrials(double bound, VoxelCandidate best) const {
     std::optional<VoxelCandidate> thrifty;
     PlateauTrial trial{.without{}, .seconds = trials_.plateauSeconds()};
-    tbb::parallel_invoke([&] { thrifty = thriftyNear(bound); },
-                         [&] {
-                           if (!trials_.isPlateau()) return;
-                           trial.with =
-                               addSeconds(trial.seconds, [&] { return withPlateau(bound); });
-                         });
+    parallelInvoke([&] { thrifty = thriftyNear(bound); },
+                   [&] {
+                     if (!trials_.isPlateau()) return;
+                     trial.with = addSeconds(trial.seconds, [&] { return withPlateau(bound); });
+                   });
     if (thrifty && isSmaller(*thrifty, best)) best = std::move(*thrifty);
     if (!trials_.isPlateau()) return best;
     trial.without = std::move(best);
@@ -102,7 +114,7 @@ class VoxelPsnrSearch {
     const double levels = trials_.fewestLevels(psnr_, bound);
     if (levels == 0.0) return std::nullopt;
     std::array<std::optional<VoxelCandidate>, kPlateauPrices.size()> made;
-    tbb::parallel_for(std::size_t{0}, made.size(), [&](std::size_t k) {
+    parallelFor(std::size_t{0}, made.size(), [&](std::size_t k) {
       Trial trial = trials_.tryBound(trials_.boundOf(levels), kPlateauPrices[k]);
       if (trial.psnr >= psnr_) made[k] = stored(std::move(trial));
     });

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "convert/octave_search.h"
+#include "convert/unless_cancelled.h"
 #include "convert/voxel_trials.h"
 #include "esvr/grid_coding.h"
 #include "format/voxel_section.h"
@@ -101,7 +102,10 @@ class VoxelSizeSearch {
                        .seconds = trials_.plateauSeconds()};
     if (trial.without) trial.without->plateau.seconds = trial.seconds;
     if (!trials_.isPlateau()) return std::move(trial.without);
-    trial.with = addSeconds(trial.seconds, [&] { return fullest(true, std::move(first.with)); });
+    trial.with = addSeconds(trial.seconds, [&] {
+      const auto tried = [&] { return fullest(true, std::move(first.with)); };
+      return trial.without ? unlessCancelled(tried) : tried();
+    });
     return std::move(trial).decide(isCloser);
   }
 
@@ -116,11 +120,15 @@ class VoxelSizeSearch {
     for (int n = 0; n < kMaxTrials && !search.ended(); ++n) {
       double bound = trials_.boundAt(search.next());
       if (plateau) bound = trials_.boundOf(trials_.levelsOf(bound));
-      SizedTrial now = known ? *std::exchange(known, std::nullopt) : tryBound(bound);
-      search.learn(std::log2(double(now.bytes)));
-      if (!now.voxels) continue;
-      const bool full = double(now.bytes) >= (1.0 - kSizeTolerance) * double(bytes_);
-      if (!best || isCloser(*now.voxels, *best)) best = std::move(now.voxels);
+      auto now = unlessCancelled([&]() -> std::optional<SizedTrial> {
+        return known ? std::exchange(known, std::nullopt) : tryBound(bound);
+      });
+      if (!now && best) break;
+      if (!now) throw Cancelled();
+      search.learn(std::log2(double(now->bytes)));
+      if (!now->voxels) continue;
+      const bool full = double(now->bytes) >= (1.0 - kSizeTolerance) * double(bytes_);
+      if (!best || isCloser(*now->voxels, *best)) best = std::move(now->voxels);
       if (full) break;
     }
     return best;

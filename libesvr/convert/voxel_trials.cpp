@@ -1,6 +1,5 @@
 #include "convert/voxel_trials.h"
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 
@@ -10,6 +9,8 @@
 #include <vector>
 
 #include "convert/octave_search.h"
+#include "convert/unless_cancelled.h"
+#include "core/parallel.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 
@@ -54,9 +55,7 @@ VoxelCandidate candidateOf(const Job& job, VoxelLayer layer, double psnr) {
 
 VoxelTrials::VoxelTrials(const Job& job)
     : job_(job), plateau_(timed([&] { return plateauOf(job.input.source); })) {
-  const ValueRange range = activeRange(job.input.source);
-  const double background = job.input.source.background;
-  range_ = std::max(double(range.max), background) - std::min(double(range.min), background);
+  range_ = spanOf(job.input.source).length();
 }
 
 bool VoxelTrials::isPlateau() const { return plateau_.share >= kPlateauShare; }
@@ -79,7 +78,9 @@ ThriftOptions VoxelTrials::thriftOf(double price) const {
 Trial VoxelTrials::tryBound(double bound, double price) const {
   VoxelLayer layer = nearestAt(bound);
   if (price > 0.0) layer = thriftyLayer(job_.input.source, std::move(layer), thriftOf(price)).layer;
-  const double psnr = psnrOf(job_, volumeOf(layer));
+  SparseVolume made = volumeOf(layer);
+  if (decodedValues(job_) == DecodedValues::kHalfs) roundToHalfs(made);
+  const double psnr = psnrOf(job_, made);
   return {bound, psnr, std::move(layer)};
 }
 
@@ -88,9 +89,12 @@ std::optional<Trial> VoxelTrials::coarsestFor(double psnr, double firstOctave, d
   OctaveSearch search(psnr + 0.3 * kPsnrTolerance, kDbPerOctave, firstOctave);
   std::optional<Trial> best;
   for (int n = 0; n < maxTrials && !search.ended(); ++n) {
-    Trial now = tryBound(boundAt(search.next()), price);
-    search.learn(now.psnr);
-    if (now.psnr >= psnr && (!best || now.bound > best->bound)) best = std::move(now);
+    auto now = unlessCancelled(
+        [&]() -> std::optional<Trial> { return tryBound(boundAt(search.next()), price); });
+    if (!now && best) break;
+    if (!now) throw Cancelled();
+    search.learn(now->psnr);
+    if (now->psnr >= psnr && (!best || now->bound > best->bound)) best = std::move(*now);
     if (best && best->psnr < psnr + kPsnrTolerance) break;
   }
   return best;
@@ -108,7 +112,10 @@ double VoxelTrials::fewestLevels(double psnr, double bound) const {
     reaches[n] = tryBound(boundOf(to + double(n)), 0.0).psnr >= psnr;
   };
   tbb::task_arena arena(trialsAtOnce());
-  arena.execute([&] { tbb::parallel_for(std::size_t{0}, reaches.size(), tryLevels); });
+  arena.execute([&, token = CancelScope::token()] {
+    const CancelScope scope(token);
+    parallelFor(std::size_t{0}, reaches.size(), tryLevels);
+  });
   const auto first = std::find(reaches.begin(), reaches.end(), true);
   return first == reaches.end() ? 0.0 : to + double(first - reaches.begin());
 }

@@ -61,8 +61,8 @@ auto timed(const Make& make) {
 /// \param psnr  its PSNR over the box, dB
 [[nodiscard]] VoxelCandidate candidateOf(const Job& job, VoxelLayer layer, double psnr);
 
-/// Quantises the volume of a job. Bounds are counted in octaves below the range of its values
-/// (octave_search.h). The job must outlive the object.
+/// Quantises the volume of a job. Bounds are counted in octaves below the span of its values
+/// (octave_search.h, spanOf). The job must outlive the object.
 class VoxelTrials {
  public:
   explicit VoxelTrials(const Job& job);

@@ -24,6 +24,7 @@ mode_t modeOf(const fs::path& path) {
 
 AtomicFile::AtomicFile(const fs::path& target, bool overwrite)
     : target_(followLinks(target)), overwrite_(overwrite) {
+  keepStandardDescriptors();
   const bool exists = checkTarget(target_, overwrite);
   const fs::path directory = target_.has_parent_path() ? target_.parent_path() : fs::path(".");
   removeLeftOvers(directory);

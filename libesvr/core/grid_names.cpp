@@ -1,6 +1,8 @@
 #include "esvr/grid_names.h"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <map>
 
 #include "esvr/error.h"
@@ -8,24 +10,137 @@
 namespace esvr {
 namespace {
 
-std::string numbered(const std::string& name, std::size_t i) {
-  return name + "[" + std::to_string(i) + "]";
+constexpr const char* kUnnamed = "(unnamed)";
+constexpr std::string_view kComponentLetters = "xyz";
+/// The most grids that an error lists. More of them do not help, and a small file may have thousands.
+constexpr std::size_t kMostListed = 20;
+
+/// The number of bytes of the UTF-8 character at the begin of a text; 0 if there is none.
+std::size_t characterAt(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return std::uint8_t(text[i]); };
+  const std::size_t length = byte(0) < 0x80   ? 1
+                             : byte(0) < 0xc2 ? 0
+                             : byte(0) < 0xe0 ? 2
+                             : byte(0) < 0xf0 ? 3
+                             : byte(0) < 0xf5 ? 4
+                                              : 0;
+  if (length > text.size()) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  const bool overlong = (byte(0) == 0xe0 && byte(1) < 0xa0) || (byte(0) == 0xf0 && byte(1) < 0x90);
+  const bool beyond = (byte(0) == 0xed && byte(1) >= 0xa0) || (byte(0) == 0xf4 && byte(1) >= 0x90);
+  return length > 1 && (overlong || beyond) ? 0 : length;
+}
+
+/// The code point of a valid UTF-8 character.
+std::uint32_t codePointOf(std::string_view character) {
+  const auto first = std::uint8_t(character[0]);
+  if (character.size() == 1) return first;
+  std::uint32_t point = first & (0x7fu >> character.size());
+  for (std::size_t i = 1; i < character.size(); ++i)
+    point = point << 6 | (std::uint8_t(character[i]) & 0x3fu);
+  return point;
+}
+
+bool isControl(std::uint32_t point) { return point < 0x20 || (point >= 0x7f && point <= 0x9f); }
+
+/// True for marks of the writing direction and for separators of lines and paragraphs.
+bool movesText(std::uint32_t point) {
+  return point == 0x061c || point == 0x200e || point == 0x200f ||
+         (point >= 0x2028 && point <= 0x202e) || (point >= 0x2066 && point <= 0x2069);
 }
 
 std::string quotedList(std::span<const std::string> names) {
   std::string list;
-  for (const auto& name : names) list += (list.empty() ? "\"" : ", \"") + name + "\"";
+  for (std::size_t n = 0; n < std::min(names.size(), kMostListed); ++n)
+    list += (n == 0 ? "\"" : ", \"") + names[n] + '"';
+  if (names.size() > kMostListed)
+    list += " and " + std::to_string(names.size() - kMostListed) + " more";
   return list.empty() ? "none" : list;
 }
 
-/// Index of the first name for which asWritten(name) equals `wanted`; names.size() if there is
-/// none.
-template <class AsWritten>
-std::size_t firstWhere(std::span<const std::string> names, const std::string& wanted,
-                       AsWritten&& asWritten) {
-  const auto it = std::find_if(names.begin(), names.end(),
-                               [&](const std::string& name) { return asWritten(name) == wanted; });
-  return std::size_t(it - names.begin());
+std::string prefixOf(const std::filesystem::path& file) {
+  return file.empty() ? "" : file.string() + ": ";
+}
+
+/// The number that all of a text is; nothing if it is none.
+std::optional<std::size_t> wholeNumber(std::string_view digits) {
+  std::size_t number = 0;
+  const char* const end = digits.data() + digits.size();
+  const auto [stop, error] = std::from_chars(digits.data(), end, number);
+  if (digits.empty() || error != std::errc{} || stop != end) return std::nullopt;
+  return number;
+}
+
+/// The most pairs of grids of one name that are compared by their traits, which takes memory for each.
+/// Where there are more, grids are paired by their numbers.
+constexpr std::size_t kMostCells = std::size_t{1} << 20;
+
+/// How far ranges of values agree. A lossy conversion changes them by a few percent.
+int agreementOfValues(const GridTraits& a, const GridTraits& b) {
+  if (!a.values || !b.values) return 0;
+  const auto& [low, high] = *a.values;
+  const double scale =
+      std::max({double(high) - low, std::abs(double(low)), std::abs(double(high))});
+  const double difference = std::max(std::abs(double(b.values->front()) - low),
+                                     std::abs(double(b.values->back()) - high));
+  if (difference == 0.0) return 6;
+  return difference <= 0.05 * scale ? 5 : 0;
+}
+
+int agreement(const GridTraits& a, const GridTraits& b) {
+  // The type counts most, because a grid of another type is never the same grid.
+  return agreementOfValues(a, b) + 16 * int(a.valueType == b.valueType) +
+         int(a.gridClass == b.gridClass) + 2 * int(a.activeBox == b.activeBox) +
+         2 * int(a.activeVoxels == b.activeVoxels);
+}
+
+/// Pairs grids of one name in order, so that the sum of agreements is largest. The first of equal
+/// choices is taken.
+class Alignment {
+ public:
+  using Places = std::vector<std::size_t>;
+
+  Alignment(std::span<const GridTraits> reference, const Places& ofReference,
+            std::span<const GridTraits> candidate, const Places& ofCandidate)
+      : reference_(reference), candidate_(candidate), rows_(ofReference), columns_(ofCandidate) {}
+
+  void pair(std::vector<std::optional<std::size_t>>& pairs) {
+    const std::size_t both = std::min(rows_.size(), columns_.size());
+    if (rows_.size() == columns_.size() || rows_.size() * columns_.size() > kMostCells) {
+      for (std::size_t k = 0; k < both; ++k) pairs[rows_[k]] = columns_[k];
+      return;
+    }
+    best_.assign((rows_.size() + 1) * (columns_.size() + 1), 0);
+    for (std::size_t r = rows_.size(); r-- > 0;)
+      for (std::size_t c = columns_.size(); c-- > 0;)
+        best(r, c) = std::max({best(r + 1, c), best(r, c + 1), paired(r, c)});
+    for (std::size_t r = 0, c = 0; r < rows_.size() && c < columns_.size();) {
+      if (best(r, c) == paired(r, c))
+        pairs[rows_[r++]] = columns_[c++];
+      else
+        best(r, c) == best(r + 1, c) ? ++r : ++c;
+    }
+  }
+
+ private:
+  int& best(std::size_t r, std::size_t c) { return best_[r * (columns_.size() + 1) + c]; }
+
+  /// A pair counts more than any sum of traits, so that no grid stays alone without need.
+  int paired(std::size_t r, std::size_t c) {
+    constexpr int kPair = 1 << 10;
+    return kPair + agreement(reference_[rows_[r]], candidate_[columns_[c]]) + best(r + 1, c + 1);
+  }
+
+  std::span<const GridTraits> reference_, candidate_;
+  const Places &rows_, &columns_;
+  std::vector<int> best_;  ///< the best sum of the grids from a row and a column on
+};
+
+std::map<std::string, std::vector<std::size_t>> placesByName(std::span<const GridTraits> grids) {
+  std::map<std::string, std::vector<std::size_t>> places;
+  for (std::size_t g = 0; g < grids.size(); ++g) places[grids[g].name].push_back(g);
+  return places;
 }
 
 }  // namespace
@@ -44,27 +159,173 @@ const char* className(GridClass gridClass) {
   return "unknown";
 }
 
+std::string shownText(std::string_view text, LineEnds lineEnds) {
+  std::string shown;
+  while (!text.empty()) {
+    const std::size_t length = characterAt(text);
+    const std::uint32_t point = length == 0 ? 0 : codePointOf(text.substr(0, length));
+    const bool isKept = point == '\n' && lineEnds == LineEnds::kKeep;
+    const bool isShown = isKept || (length > 0 && !isControl(point) && !movesText(point));
+    shown += isShown ? text.substr(0, length) : std::string_view("?");
+    text.remove_prefix(std::max<std::size_t>(length, 1));
+  }
+  return shown;
+}
+
+std::string shownName(std::string_view name) {
+  return name.empty() ? kUnnamed : shownText(name, LineEnds::kReplace);
+}
+
+GridNames::GridNames(std::vector<std::string> names) : names_(std::move(names)) {
+  for (std::size_t g = 0; g < names_.size(); ++g) {
+    Places& places = places_[names_[g]];
+    number_.push_back(places.size());
+    places.push_back(g);
+  }
+  nameUniquely();
+}
+
+void GridNames::nameUniquely() {
+  unique_.resize(names_.size());
+  // A name that is no longer itself when it is shown counts as one that is shared.
+  const auto isOwn = [&](std::size_t g) {
+    return withName(names_[g])->size() == 1 && baseOf(g) == names_[g];
+  };
+  for (std::size_t g = 0; g < names_.size(); ++g)
+    if (isOwn(g)) byUnique_[unique_[g] = names_[g]] = g;
+  for (std::size_t g = 0; g < names_.size(); ++g) {
+    if (isOwn(g)) continue;
+    std::string name = baseOf(g);
+    const bool isAlone = withName(names_[g])->size() == 1;
+    if (!isAlone || isTaken(name)) name += '[' + std::to_string(number_[g]) + ']';
+    if (isTaken(name)) name = baseOf(g);
+    while (isTaken(name) || (!isAlone && name == baseOf(g))) name += '#' + std::to_string(g + 1);
+    byUnique_[unique_[g] = name] = g;
+  }
+}
+
+std::string GridNames::baseOf(std::size_t place) const { return shownName(names_[place]); }
+
+bool GridNames::isTaken(const std::string& name) const {
+  return places_.contains(name) || byUnique_.contains(name);
+}
+
+std::string GridNames::ofComponent(std::size_t place, std::size_t component) const {
+  const std::string axis{'.', kComponentLetters.at(component)};
+  std::string name = unique_.at(place);
+  if (!isTaken(name + axis)) return name + axis;
+  name = baseOf(place) + '[' + std::to_string(number_[place]) + ']';
+  if (wholeGrid(name) == place && !isTaken(name + axis)) return name + axis;
+  name = baseOf(place);
+  do name += '#' + std::to_string(place + 1);
+  while (wholeGrid(name) != place || isTaken(name + axis));
+  return name + axis;
+}
+
+const GridNames::Places* GridNames::withName(const std::string& name) const {
+  const auto at = places_.find(name);
+  if (at != places_.end()) return &at->second;
+  return name == kUnnamed && places_.contains("") ? &places_.at("") : nullptr;
+}
+
+/// The grid of "NAME[i]".
+std::optional<std::size_t> GridNames::numbered(const std::string& wanted) const {
+  const std::size_t open = wanted.rfind('[');
+  if (open == std::string::npos || wanted.back() != ']') return std::nullopt;
+  const auto number =
+      wholeNumber(std::string_view(wanted).substr(open + 1, wanted.size() - open - 2));
+  const Places* places = withName(wanted.substr(0, open));
+  if (!number || !places || *number >= places->size()) return std::nullopt;
+  return (*places)[*number];
+}
+
+/// The grid of "NAME#n".
+std::optional<std::size_t> GridNames::placed(const std::string& wanted) const {
+  std::string name = wanted;
+  std::optional<std::size_t> number;
+  // A unique name may repeat the number, so that it differs from the names of other grids.
+  for (std::size_t mark = name.rfind('#'); mark != std::string::npos; mark = name.rfind('#')) {
+    const auto given = wholeNumber(std::string_view(name).substr(mark + 1));
+    if (!given || *given == 0 || *given > names_.size() || (number && number != given))
+      return std::nullopt;
+    number = given;
+    name.resize(mark);
+    if (name == names_[*number - 1] || name == baseOf(*number - 1)) return *number - 1;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::size_t> GridNames::wholeGrid(const std::string& wanted) const {
+  if (const auto same = places_.find(wanted); same != places_.end())
+    return same->second.size() == 1 ? std::optional(same->second.front()) : std::nullopt;
+  if (const auto own = byUnique_.find(wanted); own != byUnique_.end()) return own->second;
+  if (const Places* places = withName(wanted); places && places->size() == 1)
+    return places->front();
+  const auto number = numbered(wanted);
+  return number ? number : placed(wanted);
+}
+
+std::optional<NamedGrid> GridNames::lookUp(const std::string& wanted) const {
+  if (const auto place = wholeGrid(wanted)) return NamedGrid{*place};
+  if (places_.contains(wanted) || wanted.size() < 2 || wanted[wanted.size() - 2] != '.')
+    return std::nullopt;
+  const std::size_t axis = kComponentLetters.find(wanted.back());
+  const auto place = wholeGrid(wanted.substr(0, wanted.size() - 2));
+  if (axis == std::string_view::npos || !place) return std::nullopt;
+  return NamedGrid{*place, axis};
+}
+
+bool GridNames::isAmbiguous(const std::string& wanted) const {
+  return withName(wanted) && !lookUp(wanted);
+}
+
+std::string GridNames::list() const { return quotedList(unique_); }
+
+void GridNames::refuse(const std::string& wanted, const std::filesystem::path& file) const {
+  const Places* places = withName(wanted);
+  if (!places)
+    throw BadInput(prefixOf(file) + "has no grid \"" + shownText(wanted, LineEnds::kReplace) +
+                   "\"; there are: " + quotedList(unique_));
+  std::string candidates;
+  for (std::size_t n = 0; n < std::min(places->size(), kMostListed); ++n)
+    candidates += (n == 0 ? "\"" : ", \"") + unique_[(*places)[n]] + "\" (grid " +
+                  std::to_string((*places)[n] + 1) + " of the file)";
+  if (places->size() > kMostListed)
+    candidates += " and " + std::to_string(places->size() - kMostListed) + " more";
+  throw BadInput(prefixOf(file) + "has " + std::to_string(places->size()) + " grids \"" +
+                 shownName(wanted) + "\"; name one of them: " + candidates);
+}
+
+NamedGrid GridNames::find(const std::string& wanted, const std::filesystem::path& file) const {
+  const auto found = lookUp(wanted);
+  if (!found) refuse(wanted, file);
+  return *found;
+}
+
+std::size_t GridNames::findWhole(const std::string& wanted,
+                                 const std::filesystem::path& file) const {
+  const auto place = wholeGrid(wanted);
+  if (!place) refuse(wanted, file);
+  return *place;
+}
+
 std::vector<std::string> uniqueNames(std::span<const std::string> names) {
-  std::map<std::string, std::size_t> total, seen;
-  for (const auto& name : names) ++total[name];
-  std::vector<std::string> unique;
-  for (const auto& name : names)
-    unique.push_back(total[name] == 1 ? name : numbered(name, seen[name]++));
-  return unique;
+  return GridNames({names.begin(), names.end()}).allUnique();
 }
 
 std::size_t findGrid(std::span<const std::string> names, const std::string& wanted,
                      const std::filesystem::path& file) {
-  const auto unique = uniqueNames(names);
-  const auto asIs = [](const std::string& name) { return name; };
-  std::size_t i = firstWhere(unique, wanted, asIs);
-  if (i == names.size()) i = firstWhere(names, wanted, asIs);
-  if (i == names.size())
-    i = firstWhere(names, wanted, [](const std::string& name) { return numbered(name, 0); });
-  if (i == names.size())
-    throw BadInput((file.empty() ? "" : file.string() + ": ") + "has no grid \"" + wanted +
-                   "\"; there are: " + quotedList(unique));
-  return i;
+  return GridNames({names.begin(), names.end()}).findWhole(wanted, file);
+}
+
+std::vector<std::optional<std::size_t>> pairGrids(std::span<const GridTraits> reference,
+                                                  std::span<const GridTraits> candidate) {
+  std::vector<std::optional<std::size_t>> pairs(reference.size());
+  const auto candidates = placesByName(candidate);
+  for (const auto& [name, places] : placesByName(reference))
+    if (const auto same = candidates.find(name); same != candidates.end())
+      Alignment(reference, places, candidate, same->second).pair(pairs);
+  return pairs;
 }
 
 }  // namespace esvr

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <utility>
 
 #include "core/publish_file.h"
 #include "esvr/error.h"
@@ -16,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 int openFlags(PartialStart start) {
-  constexpr int kAlways = O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW;
+  constexpr int kAlways = O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
   return start == PartialStart::kRefuse ? kAlways | O_EXCL : kAlways;
 }
 
@@ -24,16 +25,34 @@ int openFlags(PartialStart start) {
 
 PartialFile::PartialFile(const fs::path& target, bool overwrite, PartialStart start)
     : target_(followLinks(target)), path_(pathFor(target_)), overwrite_(overwrite) {
-  checkTarget(target_, overwrite);
-  fd_ = ::open(path_.c_str(), openFlags(start), kNewFileMode);
-  if (fd_ < 0) failAt("cannot write ", path_, errno);
+  keepStandardDescriptors();
   try {
-    lock();
-    if (start == PartialStart::kReplace) truncate(0);
+    while (!open(start)) {
+    }
   } catch (...) {
-    ::close(fd_);
+    if (fd_ >= 0) ::close(fd_);
     throw;
   }
+}
+
+/// Opens and locks the file. Between the two, the process that wrote it may have completed it: what
+/// is locked then is that process's output under its final name, which must not be touched.
+/// \return false if this happened
+bool PartialFile::open(PartialStart start) {
+  checkTarget(target_, overwrite_);
+  fd_ = ::open(path_.c_str(), openFlags(start), kNewFileMode);
+  if (fd_ < 0) failAt("cannot write ", path_, errno);
+  lock();
+  struct stat own {
+  }, named{};
+  if (::fstat(fd_, &own) != 0) failAt("cannot write ", path_, errno);
+  if (!S_ISREG(own.st_mode))
+    throw RuntimeFailure("cannot write " + path_.string() + ": it is not a regular file");
+  if (::lstat(path_.c_str(), &named) == 0 && own.st_dev == named.st_dev &&
+      own.st_ino == named.st_ino)
+    return true;
+  ::close(std::exchange(fd_, -1));
+  return false;
 }
 
 PartialFile::~PartialFile() {

@@ -12,7 +12,6 @@ namespace esvr {
 /// What happens to the partial file of an earlier process.
 enum class PartialStart {
   kRefuse,   ///< it is an error
-  kReplace,  ///< its content is discarded
   kContinue  ///< its content is kept; it need not exist
 };
 
@@ -45,6 +44,7 @@ class PartialFile {
 
  private:
   void lock();
+  bool open(PartialStart start);
 
   std::filesystem::path target_, path_;
   bool overwrite_;

@@ -4,12 +4,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <string>
 #include <system_error>
 
 #include "esvr/error.h"
+#include "esvr/progress.h"
 
 namespace esvr {
 namespace {
@@ -37,10 +39,25 @@ void rename(const fs::path& file, const fs::path& target, bool overwrite) {
 
 }  // namespace
 
+void keepStandardDescriptors() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (::fcntl(fd, F_GETFD) >= 0 || errno != EBADF) continue;
+    // open() returns the lowest number that is free, which is `fd` unless another thread is faster.
+    const int opened = ::open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+    if (opened > STDERR_FILENO) ::close(opened);
+  }
+}
+
 fs::path followLinks(const fs::path& path) {
   std::error_code ignored;  // open() reports a path that cannot be resolved
   const fs::path resolved = fs::weakly_canonical(path, ignored);
   return resolved.empty() ? path : resolved;
+}
+
+bool isWrittenDirectly(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return false;
+  return S_ISCHR(status.st_mode) || S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode);
 }
 
 bool checkTarget(const fs::path& target, bool overwrite) {
@@ -62,8 +79,11 @@ void failAt(const char* what, const fs::path& path, int error) {
 }
 
 void writeAll(int fd, std::span<const std::byte> bytes, const fs::path& path) {
+  constexpr std::size_t kPiece = std::size_t{1}
+                                 << 24;  // a slow disk takes a tenth of a second for it
   while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    CancelScope::check();
+    const ssize_t n = ::write(fd, bytes.data(), std::min(bytes.size(), kPiece));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) failAt("cannot write ", path, errno);
     bytes = bytes.subspan(std::size_t(n));

@@ -1,12 +1,11 @@
 #include "esvr/sparse_volume.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <stdexcept>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -54,7 +53,7 @@ void addActive(const BrickMask& mask, Coord corner, Box& box) {
 template <class Result, class Add>
 Result overBricks(const SparseVolume& volume, const Result& none, Add add) {
   using BrickRange = tbb::blocked_range<std::size_t>;
-  return tbb::parallel_reduce(
+  return parallelReduce(
       BrickRange(0, volume.brickCount()), none,
       [&](const BrickRange& bricks, Result result) {
         for (std::size_t b = bricks.begin(); b != bricks.end(); ++b) add(b, result);
@@ -115,6 +114,35 @@ ValueRange activeRange(const SparseVolume& volume) {
       [&](std::size_t b, ValueRange& r) { addActive(volume.brickValues(b), volume.active[b], r); });
   if (range.min > range.max) throw BadInput("the grid has no active voxel");
   return range;
+}
+
+ValueSpan spanOf(const ValueRange& active, double background) {
+  const double low = active.min, high = active.max;
+  const double gap = std::max({low - background, background - high, 0.0});
+  const bool isNear = low == high ? std::isfinite(background) : gap <= high - low;
+  if (!isNear) return {low, high, true};
+  return {std::min(low, background), std::max(high, background), false};
+}
+
+ValueSpan spanOf(const SparseVolume& volume) {
+  return spanOf(activeRange(volume), volume.background);
+}
+
+double peakOf(const ValueRange& active, double background) {
+  const double low = active.min, high = active.max;
+  if (low == high) return low == 0.0 ? 1.0 : std::abs(low);
+  if (low < 0.0 && high > 0.0) return std::max(-low, high);
+  const ValueSpan span = spanOf(active, background);
+  return low >= 0.0 ? high - std::max(span.low, 0.0) : std::min(span.high, 0.0) - low;
+}
+
+void setBackground(float background, SparseVolume& volume) {
+  volume.background = background;
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v)) values[std::size_t(v)] = background;
+  });
 }
 
 void dropInactiveBricks(SparseVolume& volume) {

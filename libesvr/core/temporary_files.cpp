@@ -9,6 +9,7 @@
 #include <cctype>
 #include <cerrno>
 #include <cstdio>
+#include <cstdlib>
 #include <random>
 #include <string>
 #include <system_error>
@@ -75,6 +76,17 @@ TemporaryFile createTemporary(const fs::path& directory, mode_t mode) {
     if (!removed(file.fd)) return file;
     ::close(file.fd);
   }
+}
+
+int createNameless(const fs::path& directory) {
+  constexpr mode_t kOwnerOnly = 0600;
+  const int fd = ::open(directory.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, kOwnerOnly);
+  if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) return fd;
+  // A file system without such files: the file loses its name at once.
+  std::string name = (directory / "esvr-XXXXXX").string();
+  const int named = ::mkostemp(name.data(), O_CLOEXEC);
+  if (named >= 0) ::unlink(name.c_str());
+  return named;
 }
 
 void removeLeftOvers(const fs::path& directory) {

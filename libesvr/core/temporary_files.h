@@ -1,5 +1,5 @@
 #pragma once
-/// Temporary files of AtomicFile. A process locks the file that it writes, and the system releases
+/// Temporary files. Those of AtomicFile have names: a process locks the file that it writes, and the system releases
 /// the lock when the process ends for any reason. A file without a lock is therefore left over.
 
 #include <sys/types.h>
@@ -15,6 +15,10 @@ struct TemporaryFile {
 
 /// Creates a file with a new name in a directory.
 [[nodiscard]] TemporaryFile createTemporary(const std::filesystem::path& directory, mode_t mode);
+
+/// Creates a file without a name, which the system removes when it is closed. Its owner alone may
+/// read and write it. \return -1 if this failed, see errno
+[[nodiscard]] int createNameless(const std::filesystem::path& directory);
 
 /// Removes this user's temporary files in a directory whose processes have ended. Errors are
 /// ignored; files that cannot be removed stay.

@@ -1,10 +1,10 @@
 #include "esvr/vector_grid.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "core/parallel.h"
 
 namespace esvr {
 namespace {
@@ -82,7 +82,7 @@ SparseVolume magnitudeOf(const VectorVolume& vectors) {
   const SparseVolume &x = all[0], &y = all[1], &z = all[2];  // a lambda cannot capture bindings
   SparseVolume result = x;
   result.background = lengthOf(x.background, y.background, z.background);
-  tbb::parallel_for(std::size_t{0}, result.values.size(), [&](std::size_t v) {
+  parallelFor(std::size_t{0}, result.values.size(), [&](std::size_t v) {
     result.values[v] = lengthOf(x.values[v], y.values[v], z.values[v]);
   });
   return result;

@@ -11,6 +11,8 @@
 #include <system_error>
 
 #include "core/byte_text.h"
+#include "core/publish_file.h"
+#include "core/temporary_files.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -18,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr mode_t kOwnerOnly = 0600;
 /// Time between two looks at the memory in use. A look takes 20 microseconds; a program that scans
 /// voxels on all cores reaches some 100 MB between two looks.
 constexpr std::chrono::milliseconds kLookEvery{5};
@@ -26,16 +27,6 @@ constexpr std::chrono::milliseconds kLookEvery{5};
 [[noreturn]] void fail(const fs::path& folder, std::size_t bytes, int error) {
   throw RuntimeFailure("cannot keep " + byteText(double(bytes)) + " of voxels in a file in " +
                        folder.string() + ": " + std::system_category().message(error));
-}
-
-/// Opens a file that has no name. On file systems without such files, it loses its name at once.
-int openNameless(const fs::path& folder) {
-  const int fd = ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, kOwnerOnly);
-  if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) return fd;
-  std::string name = (folder / "esvr-voxels-XXXXXX").string();
-  const int named = ::mkostemp(name.data(), O_CLOEXEC);
-  if (named >= 0) ::unlink(name.c_str());
-  return named;
 }
 
 /// Reserves the bytes on the disk. \return 0 or the number of the error
@@ -64,7 +55,8 @@ VoxelFiles::~VoxelFiles() {
 }
 
 void* VoxelFiles::map(std::size_t bytes) {
-  const int fd = openNameless(options_.folder);
+  keepStandardDescriptors();
+  const int fd = createNameless(options_.folder);
   if (fd < 0) fail(options_.folder, bytes, errno);
   int error = reserve(fd, bytes);
   void* const array =

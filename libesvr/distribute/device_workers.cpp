@@ -7,14 +7,18 @@
 
 namespace esvr {
 
-DeviceWorkers::DeviceWorkers(std::vector<Device> devices) : devices_(std::move(devices)) {}
+DeviceWorkers::DeviceWorkers(std::vector<Device> devices, LostDevice onLost)
+    : devices_(std::move(devices)),
+      working_(std::make_unique<WorkingDevices>(devices_, std::move(onLost))) {}
+
+DeviceWorkers::~DeviceWorkers() = default;
 
 std::vector<std::vector<std::byte>> DeviceWorkers::run(const RoundParts& parts) {
   std::vector<std::vector<std::byte>> results(parts.count());
   std::atomic<std::size_t> next{0};
   const auto work = [&](const Device& device) {
     for (std::size_t p = next++; p < parts.count(); p = next++)
-      results[p] = parts.fit(p, device).bytes;
+      results[p] = working_->fit(parts, p, device).bytes;
   };
   onDevices(devices_, work, [&] { next = parts.count(); });
   return results;

@@ -1,8 +1,13 @@
 #include "distribute/on_devices.h"
 
+#include <algorithm>
 #include <exception>
 #include <future>
+#include <utility>
 #include <vector>
+
+#include "esvr/error.h"
+#include "esvr/progress.h"
 
 namespace esvr {
 
@@ -11,7 +16,8 @@ void onDevices(std::span<const Device> devices, const std::function<void(const D
   if (devices.size() == 1) return work(devices.front());
   std::vector<std::future<void>> running;
   for (const Device& device : devices)
-    running.push_back(std::async(std::launch::async, [&, device] {
+    running.push_back(std::async(std::launch::async, [&, device, token = CancelScope::token()] {
+      const CancelScope scope(token);
       try {
         work(device);
       } catch (...) {
@@ -21,6 +27,38 @@ void onDevices(std::span<const Device> devices, const std::function<void(const D
     }));
   for (auto& call : running) call.wait();
   for (auto& call : running) call.get();
+}
+
+WorkingDevices::WorkingDevices(std::span<const Device> devices, LostDevice onLost)
+    : onLost_(std::move(onLost)) {
+  for (const Device& device : devices)
+    if (std::ranges::count(left_, device) == 0) left_.push_back(device);
+}
+
+PartOutput WorkingDevices::fit(const RoundParts& parts, std::size_t part, const Device& own) {
+  for (;;) {
+    const Device device = workingFor(own);
+    try {
+      return parts.fit(part, device);
+    } catch (const DeviceError& error) {
+      lose(device, error.what());
+    }
+  }
+}
+
+Device WorkingDevices::workingFor(const Device& device) {
+  const std::lock_guard lock(mutex_);
+  if (left_.empty()) throw DeviceError("all devices have failed");
+  if (std::ranges::count(left_, device) > 0) return device;
+  return left_[next_++ % left_.size()];
+}
+
+/// To be called while the device's error is handled, which is thrown again if no device is left.
+void WorkingDevices::lose(const Device& device, const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  const bool isKnown = std::erase(left_, device) == 0;
+  if (left_.empty()) throw;
+  if (!isKnown && onLost_) onLost_(device, why);
 }
 
 }  // namespace esvr

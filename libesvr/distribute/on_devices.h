@@ -1,10 +1,15 @@
 #pragma once
 /// Runs work on several devices.
 
+#include <cstddef>
 #include <functional>
+#include <mutex>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "esvr/device.h"
+#include "esvr/part_runner.h"
 
 namespace esvr {
 
@@ -13,5 +18,25 @@ namespace esvr {
 /// \throws Error  what the first call that failed threw, in the order of the devices
 void onDevices(std::span<const Device> devices, const std::function<void(const Device&)>& work,
                const std::function<void()>& stop);
+
+/// Devices of one kind, which give the same results. Where one fails, the others do its parts.
+class WorkingDevices {
+ public:
+  /// \param onLost  may be empty
+  WorkingDevices(std::span<const Device> devices, LostDevice onLost);
+
+  /// Fits a part on a device; if this device fails or has failed, on another one.
+  /// \throws DeviceError  no device is left
+  [[nodiscard]] PartOutput fit(const RoundParts& parts, std::size_t part, const Device& device);
+
+ private:
+  [[nodiscard]] Device workingFor(const Device& device);
+  void lose(const Device& device, const std::string& why);
+
+  std::mutex mutex_;
+  std::vector<Device> left_;  ///< without repetitions
+  std::size_t next_ = 0;      ///< counts the parts that were given to another device
+  LostDevice onLost_;
+};
 
 }  // namespace esvr

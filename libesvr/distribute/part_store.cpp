@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "core/publish_file.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -40,9 +41,21 @@ struct ResultHead {
                        std::system_category().message(error));
 }
 
+/// The files in the folder are made by this class. A link or a pipe was put there by somebody else,
+/// and writing to what it leads to would destroy another file.
+void requirePlainFile(const fs::path& path) {
+  std::error_code missing;
+  const auto type = fs::symlink_status(path, missing).type();
+  if (type != fs::file_type::regular && type != fs::file_type::not_found)
+    throw RuntimeFailure("cannot use " + path.string() + ": it is not a regular file");
+}
+
 /// Locks a file, which is created if it is missing. \return nothing if another process has the lock
 std::optional<PartStore::Lock> tryLock(const fs::path& path, int operation) {
-  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
+  requirePlainFile(path);
+  keepStandardDescriptors();
+  const int fd =
+      ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kMode);
   if (fd < 0) fail(path, errno);
   PartStore::Lock lock(fd);
   if (::flock(fd, operation | LOCK_NB) == 0) return lock;
@@ -65,6 +78,16 @@ std::string textOf(const std::vector<PartOrigin>& origin) {
   return text;
 }
 
+/// True for the names of files that a PartStore makes.
+bool isOurName(const std::string& name) {
+  if (name == kLock || name == kOrigin) return true;
+  const std::string stem = fs::path(name).stem().string();
+  const std::string extension = fs::path(name).extension().string();
+  constexpr std::size_t kDigits = 32;
+  return (extension == kResult || extension == kClaim) && stem.size() == kDigits &&
+         stem.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
 std::vector<std::string> linesOf(const fs::path& path) {
   std::ifstream in(path);
   std::vector<std::string> lines;
@@ -82,6 +105,7 @@ PartStore::Lock::~Lock() {
 
 PartStore::PartStore(fs::path folder, const std::vector<PartOrigin>& origin, Access access)
     : folder_(std::move(folder)), lock_(lockFolder(folder_, access)) {
+  requirePlainFile(folder_ / kOrigin);
   if (!fs::exists(folder_ / kOrigin)) {
     const std::string text = textOf(origin);
     AtomicFile file(folder_ / kOrigin, true);
@@ -114,6 +138,7 @@ bool PartStore::contains(const PartKey& key) const { return fs::exists(fileOf(ke
 
 std::optional<std::vector<std::byte>> PartStore::find(const PartKey& key) const {
   const fs::path path = fileOf(key, kResult);
+  requirePlainFile(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) return std::nullopt;
   ResultHead head;
@@ -129,6 +154,8 @@ std::optional<std::vector<std::byte>> PartStore::find(const PartKey& key) const 
 
 void PartStore::put(const PartKey& key, std::span<const std::byte> result) {
   const ResultHead head{.bytes = result.size(), .hash = XXH3_64bits(result.data(), result.size())};
+  requirePlainFile(fileOf(key, kResult));
+  const Completion completion;  // a part that is complete is kept
   AtomicFile file(fileOf(key, kResult), true);
   file.write(std::as_bytes(std::span(&head, 1)));
   file.write(result);
@@ -148,7 +175,13 @@ PartStore::Claim::~Claim() {
 
 void PartStore::remove() {
   std::error_code ignored;  // files that cannot be removed do no harm: OUT.esvr is complete
-  fs::remove_all(folder_, ignored);
+  std::vector<fs::path> ours;
+  for (fs::directory_iterator at(folder_, ignored), end; !ignored && at != end;
+       at.increment(ignored))
+    if (isOurName(at->path().filename().string())) ours.push_back(at->path());
+  for (const fs::path& file : ours) fs::remove(file, ignored);
+  removeLeftOvers(folder_);
+  ::rmdir(folder_.c_str());  // which fails if files of others are in it, or if it is a link
 }
 
 }  // namespace esvr

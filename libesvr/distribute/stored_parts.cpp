@@ -59,7 +59,8 @@ class StoredRound {
         options_(options),
         parts_(parts),
         results_(parts.count()),
-        queue_(parts.count(), firstOf(options.share, parts.count())) {}
+        queue_(parts.count(), firstOf(options.share, parts.count())),
+        working_(options.devices, options.onLost) {}
 
   std::vector<std::vector<std::byte>> run() {
     const auto work = [this](const Device& device) {
@@ -91,7 +92,7 @@ class StoredRound {
     return found.has_value();
   }
   void fit(std::size_t part, const PartKey& key, const Device& device) {
-    PartOutput output = parts_.fit(part, device);
+    PartOutput output = working_.fit(parts_, part, device);
     if (output.complete) store_.put(key, output.bytes);
     results_[part] = std::move(output.bytes);
   }
@@ -101,6 +102,7 @@ class StoredRound {
   const RoundParts& parts_;
   std::vector<std::vector<std::byte>> results_;
   Queue queue_;
+  WorkingDevices working_;
 };
 
 }  // namespace

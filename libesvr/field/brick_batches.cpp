@@ -1,12 +1,10 @@
 #include "field/brick_batches.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <functional>
 #include <vector>
 
+#include "core/parallel.h"
 #include "field/brick_evaluator.h"
 #include "field/count_bricks.h"
 
@@ -24,7 +22,7 @@ double maxPairs(std::span<const Support> reach, std::span<const Coord> corners) 
   using Range = tbb::blocked_range<std::size_t>;
   const Box bounds = boundsOf(corners);
   const double bricks = double(corners.size());
-  return tbb::parallel_deterministic_reduce(
+  return parallelDeterministicReduce(
       Range(0, reach.size(), 4096), 0.0,
       [&](const Range& range, double sum) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)

@@ -1,7 +1,6 @@
 #include "field/brick_evaluator.h"
 
-#include <tbb/parallel_for.h>
-
+#include "core/parallel.h"
 #include "esvr/sparse_volume.h"
 #include "field/brick_kernels.h"
 #include "field/evaluate_plan.h"
@@ -22,7 +21,7 @@ void BrickEvaluator::evaluateBrick(std::size_t brick, float* sum) const {
 }
 
 void BrickEvaluator::evaluate(std::size_t first, std::span<float> out) const {
-  tbb::parallel_for(std::size_t(0), out.size() / kBrickVoxels, [&](std::size_t b) {
+  parallelFor(std::size_t(0), out.size() / kBrickVoxels, [&](std::size_t b) {
     alignas(64) float sum[kBrickVoxels] = {};
     evaluateBrick(first + b, sum);
     for (std::size_t v = 0; v < kBrickVoxels; ++v)

@@ -1,14 +1,13 @@
 #include "field/brick_pairs.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "core/parallel.h"
 #include "field/brick_set.h"
 #include "field/brick_walk.h"
 #include "field/offsets.h"
@@ -44,7 +43,7 @@ void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit)
 template <class Visit>
 void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf& supportOf,
                 Visit&& visit) {
-  tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
+  parallelFor(Range(0, ellipsoids, 64), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       std::uint32_t n = 0;
       forEachPair(index, supportOf(i), [&](std::uint32_t b) { visit(i, n++, b); });
@@ -79,13 +78,13 @@ class PairSort {
     const std::size_t most = bricks_.size() / 4 / std::max<std::size_t>(1, brickCount_);
     parts_ = std::clamp<std::size_t>(most, 1, std::size_t(tbb::this_task_arena::max_concurrency()));
     next_.assign(parts_ * brickCount_, 0);
-    tbb::parallel_for(std::size_t(0), parts_, [&](std::size_t part) {
+    parallelFor(std::size_t(0), parts_, [&](std::size_t part) {
       for (std::size_t k = firstOf(part); k < firstOf(part + 1); ++k) ++next(part, bricks_[k]);
     });
     makePlaces();
     pairs_.ellipsoid.resize(bricks_.size());
     pairs_.pairOf.resize(bricks_.size());
-    tbb::parallel_for(std::size_t(0), parts_, [&](std::size_t part) { place(part); });
+    parallelFor(std::size_t(0), parts_, [&](std::size_t part) { place(part); });
   }
 
  private:
@@ -138,7 +137,7 @@ BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
 std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
                                  const SupportOf& supportOf, const Box& within) {
   tbb::enumerable_thread_specific<BrickSet> found;
-  tbb::parallel_for(Range(0, ellipsoids, 64), [&](const Range& range) {
+  parallelFor(Range(0, ellipsoids, 64), [&](const Range& range) {
     auto& mine = found.local();
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       forEachReachedBrick(supportOf(i), within, [&](Coord brick) {

@@ -1,7 +1,7 @@
-#include <tbb/parallel_for.h>
 
 #include <array>
 
+#include "core/parallel.h"
 #include "esvr/field.h"
 #include "field/evaluate_plan.h"
 #include "field/line_math.h"
@@ -52,8 +52,8 @@ EllipsoidHits hitsInBrick(const EvaluatePlan& plan, std::size_t b, Coord brickCo
 EllipsoidHits countHits(const Field& field, std::span<const Coord> corners) {
   const EvaluatePlan plan = planEvaluation(field, corners);
   std::vector<EllipsoidHits> hits(corners.size());
-  tbb::parallel_for(std::size_t(0), corners.size(),
-                    [&](std::size_t b) { hits[b] = hitsInBrick(plan, b, corners[b]); });
+  parallelFor(std::size_t(0), corners.size(),
+              [&](std::size_t b) { hits[b] = hitsInBrick(plan, b, corners[b]); });
   EllipsoidHits total;
   for (const EllipsoidHits& h : hits) total.voxelPairs += h.voxelPairs, total.voxels += h.voxels;
   return total;

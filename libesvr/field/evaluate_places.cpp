@@ -1,9 +1,9 @@
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/brick_index.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "field/evaluate_plan.h"
@@ -152,12 +152,12 @@ void evaluatePlaces(const Field& field, std::span<const Place> places, std::span
     return all.subspan(first, std::min(kPlacesPerGroup, all.size() - first));
   };
   std::vector<PlaceGroup> sorted(groups);
-  tbb::parallel_for(std::size_t(0), groups,
-                    [&](std::size_t g) { sorted[g] = groupOf(partOf(places, g)); });
+  parallelFor(std::size_t(0), groups,
+              [&](std::size_t g) { sorted[g] = groupOf(partOf(places, g)); });
   const std::vector<Coord> corners = cornersOf(sorted);
   if (corners.empty()) return;
   const PlaceEvaluator evaluator(field, corners);
-  tbb::parallel_for(std::size_t(0), groups, [&](std::size_t g) {
+  parallelFor(std::size_t(0), groups, [&](std::size_t g) {
     evaluator.evaluate(sorted[g], partOf(places, g), partOf(out, g));
   });
 }

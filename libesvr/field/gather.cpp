@@ -1,7 +1,6 @@
 #include "field/gather.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
+#include "core/parallel.h"
 
 namespace esvr {
 namespace {
@@ -28,7 +27,7 @@ void forEachEllipsoid(const Field& field, Visit&& visit) {
   for (std::uint32_t c = 0; c < field.chunks.size(); ++c) {
     const Chunk& chunk = field.chunks[c];
     const tbb::blocked_range<std::size_t> all(0, chunk.ellipsoids.size(), kGrain);
-    tbb::parallel_for(all, [&](const auto& range) {
+    parallelFor(all, [&](const auto& range) {
       for (std::size_t i = range.begin(); i != range.end(); ++i) visit(first + i, c, chunk, i);
     });
     first += chunk.ellipsoids.size();

@@ -1,9 +1,9 @@
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <vector>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "field/active_region.h"
@@ -42,7 +42,7 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
   std::vector<BrickMask> masks(std::min(kBatchBricks, corners.size()));
   volume.values.reserve(corners.size() * kBrickVoxels);
   forEachBatch(field, corners, [&](const BrickBatch& batch) {
-    tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
+    parallelFor(std::size_t{0}, batch.size(), [&](std::size_t b) {
       masks[b] = settle(rule, regionIn(options, batch.corners[b]), batch.values(b));
     });
     for (std::size_t b = 0; b < batch.size(); ++b) {

@@ -1,11 +1,10 @@
 #include "esvr/stability.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "core/parallel.h"
 #include "esvr/field.h"
 #include "field/extreme_ellipsoids.h"
 #include "field/reference_brick.h"
@@ -148,7 +147,7 @@ Stability measureStability(const Field& field, const StabilityOptions& options) 
   const FieldComparison comparison(field, options);
   std::vector<ReferenceBrick> references(samples.size());
   std::vector<BrickFigures> figures(samples.size());
-  tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t b) {
+  parallelFor(std::size_t{0}, samples.size(), [&](std::size_t b) {
     references[b] = comparison.reference(samples[b]);
     figures[b] = comparison.compare(samples[b], references[b], &values[b * kBrickVoxels]);
   });

@@ -1,12 +1,11 @@
 #include "fit/export_field.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <vector>
 
+#include "core/parallel.h"
 #include "fit/frame.h"
 
 namespace esvr {
@@ -35,8 +34,8 @@ bool fitInOneFrame(std::span<const Ellipsoid> ellipsoids) {
 
 Field exportField(std::span<const Ellipsoid> ellipsoids, const ExportFrame& frame) {
   std::vector<PrincipalAxes> axes(ellipsoids.size());
-  tbb::parallel_for(std::size_t{0}, axes.size(),
-                    [&](std::size_t i) { axes[i] = principalAxes(ellipsoids[i].L); });
+  parallelFor(std::size_t{0}, axes.size(),
+              [&](std::size_t i) { axes[i] = principalAxes(ellipsoids[i].L); });
   const bool inOne = fitInOneFrame(ellipsoids);
   std::map<Coord, Ellipsoids> byChunk;
   for (std::size_t i = 0; i < ellipsoids.size(); ++i) {

@@ -63,9 +63,11 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
 
   const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
   const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
-  if (end.end == FitEnd::kCancelled && optimiser->ellipsoidCount() == 0) throw Cancelled();
+  const bool isCancelled = end.end == FitEnd::kCancelled;
+  if (isCancelled && optimiser->ellipsoidCount() == 0) throw Cancelled();
+  const BestSoFar completion;
   const FitState all = options.start ? optimiser->state() : FitState{};
-  optimiser->dropUnseen();
+  if (!isCancelled) optimiser->dropUnseen();  // it takes as long as two iterations
   recorder.record(*optimiser, end.iterations);
 
   FitResult result;
@@ -93,6 +95,8 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
 
 FitResult fit(const SparseVolume& volume, const FitOptions& options) {
   checkOptions(options);
+  const CancelScope scope(CancelScope::orToken(options.cancel));
+  CancelScope::check();
   const TargetScale scale = scaleOf(volume, options.peak);
   if (isEmpty(scale)) return emptyFit(volume, options.kappa.value_or(Kernel{}.kappa));
   const std::size_t count = plannedCount(options, activeVoxelCount(volume));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "esvr/progress.h"
+
 namespace esvr {
 namespace {
 
@@ -50,6 +52,7 @@ std::vector<double> IntensityProblem::conjugateGradients(int iterations) {
   double rho = dot(residual, z);
   const double converged = rho * kConvergedRatio;
   for (int k = 0; k < iterations && rho > converged; ++k) {
+    CancelScope::check();
     passes_->applyNormal(p, q);
     const double alpha = rho / dot(p, q);
     if (!std::isfinite(alpha)) break;
@@ -74,6 +77,7 @@ double IntensityProblem::solve(std::vector<float>& intensities, int iterations) 
   const double before = passes_->gradient(intensities, gradient_).squares;
   const auto step = conjugateGradients(iterations);
   for (double share = 1.0; share > 0.1; share *= 0.5) {
+    CancelScope::check();
     auto tried = moved(intensities, step, share);
     const double after = passes_->error(tried).squares;
     if (!(after < before)) continue;

@@ -1,12 +1,11 @@
 #include "esvr/psnr_between.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include "core/brick_index.h"
+#include "core/parallel.h"
 #include "esvr/field.h"
 #include "esvr/metrics.h"
 #include "field/brick_batches.h"
@@ -62,7 +61,7 @@ class BetweenError {
     double squares = 0.0;
     std::vector<double> ofBricks(std::min(kBatchBricks, corners.size()));
     forEachBatch(moved, corners, [&](const BrickBatch& batch) {
-      tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
+      parallelFor(std::size_t{0}, batch.size(), [&](std::size_t b) {
         ofBricks[b] = squaresOf(batch.corners[b], batch.values(b), offset);
       });
       for (std::size_t b = 0; b < batch.size(); ++b) squares += ofBricks[b];

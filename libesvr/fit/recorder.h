@@ -23,7 +23,9 @@ class Recorder {
       : target_(target), options_(options) {}
 
   [[nodiscard]] double seconds() const;
-  [[nodiscard]] bool cancelled() const { return options_.cancel && options_.cancel->cancelled(); }
+  [[nodiscard]] bool cancelled() const {
+    return CancelScope::cancelled() || (options_.cancel && options_.cancel->cancelled());
+  }
 
   /// Appends a point to the curve.
   const TimedCurvePoint& record(const FitErrors& errors, std::size_t ellipsoids,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "esvr/error.h"
 #include "fit/kappa_descent.h"
 
 namespace esvr {
@@ -28,10 +29,16 @@ class FitRun {
 
   RunEnd run() {
     if (!plan_.start.ellipsoids.empty()) optimiser_.setState(plan_.start);
-    return {iterateToEnd(), done_};
+    return {iterateUnlessCancelled(), done_};
   }
 
  private:
+  /// A cancellation may end an iteration between two of its passes. The ellipsoids then are those before
+  /// its step, or some of them those after it.
+  FitEnd iterateUnlessCancelled() try { return iterateToEnd(); } catch (const Cancelled&) {
+    return FitEnd::kCancelled;
+  }
+
   FitEnd iterateToEnd() {
     while (!finished()) {
       if (recorder_.cancelled()) return FitEnd::kCancelled;

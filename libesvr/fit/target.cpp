@@ -1,15 +1,12 @@
 #include "fit/target.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
 #include <span>
 
+#include "core/parallel.h"
 #include "esvr/metrics.h"
 
 namespace esvr {
@@ -18,7 +15,7 @@ namespace {
 /// The range of all values, active or not.
 ValueRange rangeOfAll(std::span<const float> values) {
   using ValueSpan = tbb::blocked_range<std::size_t>;
-  return tbb::parallel_reduce(
+  return parallelReduce(
       ValueSpan(0, values.size(), kBrickVoxels), ValueRange::none(),
       [&](const ValueSpan& part, ValueRange range) {
         for (std::size_t i = part.begin(); i != part.end(); ++i) range.expand(values[i]);
@@ -74,7 +71,7 @@ FitTarget makeTarget(const VolumePart& part, const Box& box, const TargetScale& 
   }
   target.values.resize(part.bricks.size() * kBrickVoxels);
   const double background = volume.background;
-  tbb::parallel_for(std::size_t{0}, part.bricks.size(), [&](std::size_t n) {
+  parallelFor(std::size_t{0}, part.bricks.size(), [&](std::size_t n) {
     const auto values = volume.brickValues(part.bricks[n]);
     std::transform(values.begin(), values.end(),
                    target.values.begin() + std::ptrdiff_t(n * kBrickVoxels),

@@ -1,13 +1,12 @@
 #include "format/active_threshold.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
+#include "core/parallel.h"
 #include "field/active_region.h"
 #include "field/brick_batches.h"
 
@@ -116,7 +115,7 @@ ThresholdChoice chooseThreshold(const SparseVolume& source, const Field& field,
   const std::size_t batch = std::min(kBatchBricks, place.bricks.size());
   std::vector<Histogram> parts((batch + kBricksOfPart - 1) / kBricksOfPart);
   forEachBatch(field, place.bricks, [&](const BrickBatch& sums) {
-    tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
+    parallelFor(std::size_t{0}, parts.size(), [&](std::size_t p) {
       const std::size_t end = std::min((p + 1) * kBricksOfPart, sums.size());
       for (std::size_t b = p * kBricksOfPart; b < end; ++b)
         addBrick(source, rule, place.box, sums.corners[b], sums.values(b), parts[p]);

@@ -2,8 +2,10 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "format/byte_source.h"
 #include "format/packed_sections.h"
+#include "format/validity.h"
 
 namespace esvr {
 namespace {
@@ -22,17 +24,24 @@ void noteSkipped(const SectionTable& table, std::vector<std::string>& notes) {
                       " bytes");
 }
 
+/// Readers of voxels need no map, but no VDB file can be made with one that is damaged.
+void requireMap(const StoredGrid& grid, const std::string& file) {
+  if (const auto fault = mapFaultOf(grid.descriptor.transform))
+    throw BadInput(file + ": grid '" + grid.descriptor.name + "': " + fault->text);
+}
+
 void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
-  const std::string name = "grid '" + grid.descriptor.name + "'";
+  const std::string name = "grid '" + shownName(grid.descriptor.name) + "'";
   if (grid.field.ellipsoidCount() == 0)
     notes.push_back(name +
                     (grid.voxels ? " holds voxels and no ellipsoids" : " has no ellipsoids"));
-  if (float(grid.descriptor.background) != grid.field.background)
+  if (!grid.farBackground && float(grid.descriptor.background) != grid.field.background)
     notes.push_back(name + " has one background in its descriptor and another in its field");
 }
 
 void noteCarried(const CarriedGrid& grid, std::vector<std::string>& notes) {
-  notes.push_back("grid '" + grid.name + "' is carried unchanged (" + grid.treeType + ")");
+  notes.push_back("grid '" + shownName(grid.name) + "' is carried unchanged (" +
+                  shownName(grid.treeType) + ")");
 }
 
 /// The file without its carried grids, whose bytes are not decoded.
@@ -54,7 +63,10 @@ std::vector<std::string> checkEsvr(const std::filesystem::path& path, const Read
   std::vector<std::string> notes;
   noteVersion(table, notes);
   noteSkipped(table, notes);
-  for (const auto& grid : file.grids) noteGrid(grid, notes);
+  for (const auto& grid : file.grids) {
+    requireMap(grid, path.string());
+    noteGrid(grid, notes);
+  }
   for (const auto& grid : file.carried) noteCarried(grid, notes);
   return notes;
 }

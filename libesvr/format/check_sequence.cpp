@@ -4,6 +4,7 @@
 #include "esvr/sequence_file.h"
 #include "format/byte_source.h"
 #include "format/sequence_index.h"
+#include "format/validity.h"
 
 namespace esvr {
 namespace {
@@ -61,7 +62,10 @@ std::vector<SequenceFault> checkSequence(const std::filesystem::path& path,
   std::vector<SequenceFault> faults;
   SequenceReader reader(path, limits);
   for (const SequenceFrame& frame : reader.frames()) try {
-      (void)reader.read(frame.number);
+      for (const StoredGrid& grid : reader.read(frame.number).grids)
+        if (const auto fault = mapFaultOf(grid.descriptor.transform))
+          throw BadInput(frameName(path.string(), frame.number) + ": grid '" +
+                         grid.descriptor.name + "': " + fault->text);
     } catch (const BadInput& fault) {
       faults.push_back({frame.number, fault.what()});
     }

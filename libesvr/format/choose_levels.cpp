@@ -1,13 +1,12 @@
 #include "format/choose_levels.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
 
 #include "core/brick_index.h"
+#include "core/parallel.h"
 #include "esvr/simplified_mask.h"
 #include "field/active_region.h"
 #include "field/brick_batches.h"
@@ -53,8 +52,8 @@ class BlockCounter {
     for (const Coord corner : corners) tally_.bricks.push_back(brickOf(corner));
     std::size_t first = 0;
     forEachBatch(task_.field, corners, [&](const BrickBatch& sums) {
-      tbb::parallel_for(std::size_t{0}, sums.size(),
-                        [&](std::size_t b) { count(sums.corners[b], sums.values(b), first + b); });
+      parallelFor(std::size_t{0}, sums.size(),
+                  [&](std::size_t b) { count(sums.corners[b], sums.values(b), first + b); });
       first += sums.size();
     });
     return std::move(tally_);

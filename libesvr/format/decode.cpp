@@ -6,6 +6,7 @@
 #include "esvr/error.h"
 #include "format/carried_record.h"
 #include "format/continued_grid.h"
+#include "format/ellipsoid_block.h"
 #include "format/frame_table.h"
 #include "format/grid_decoder.h"
 #include "format/grid_record.h"
@@ -192,6 +193,35 @@ PartOfFile decodePart(const ByteSource& source, const ReadPart& part) {
 }
 
 }  // namespace format
+
+namespace {
+
+std::uint64_t heapBytesOf(const VoxelLayer& layer) {
+  const std::uint64_t codes = layer.codes.size() * sizeof(std::int32_t);
+  return (layer.codes.get_allocator().memory().isInFile(codes) ? 0 : codes) +
+         layer.bricks.size() * (sizeof(Coord) + 2 * sizeof(BrickMask));
+}
+
+std::uint64_t heapBytesOf(const StoredGrid& grid) {
+  double ellipsoids = 0.0;
+  for (const Chunk& chunk : grid.field.chunks)
+    ellipsoids += double(chunk.ellipsoids.size()) * format::kDecodedBytesPerEllipsoid;
+  return std::uint64_t(ellipsoids) + grid.bricks.size() * sizeof(Coord) +
+         grid.mask.size() * sizeof(BrickMask) + grid.levels.size() * sizeof(BlockLevels) +
+         (grid.voxels ? heapBytesOf(*grid.voxels) : 0) +
+         (grid.residual ? heapBytesOf(*grid.residual) : 0);
+}
+
+}  // namespace
+
+std::uint64_t contentBytes(const EsvrFile& file) {
+  std::uint64_t bytes = 0;
+  for (const StoredGrid& grid : file.grids) bytes += heapBytesOf(grid);
+  for (const CarriedGrid& grid : file.carried)
+    if (!grid.bytes.get_allocator().memory().isInFile(grid.bytes.size()))
+      bytes += grid.bytes.size();
+  return bytes;
+}
 
 EsvrFile decodeEsvr(std::span<const std::byte> bytes, const std::string& nameForErrors,
                     const ReadLimits& limits) {

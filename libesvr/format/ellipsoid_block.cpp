@@ -1,7 +1,5 @@
 #include "format/ellipsoid_block.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <bit>
 #include <type_traits>
@@ -10,6 +8,7 @@
 #include "codec/lattice_bits.h"
 #include "codec/morton.h"
 #include "codec/symbol_coder.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 
 namespace esvr::format {
@@ -201,8 +200,8 @@ std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q) {
   const std::vector<Run> runs = blockRuns(q);
   std::vector<BlockStreams> blocks(runs.size());
   // The coder writes each value that it reads back to `q`, and each block only to its own run.
-  tbb::parallel_for(std::size_t{0}, runs.size(),
-                    [&](std::size_t b) { blocks[b] = encodeBlock(q, runs[b]); });
+  parallelFor(std::size_t{0}, runs.size(),
+              [&](std::size_t b) { blocks[b] = encodeBlock(q, runs[b]); });
   return blocks;
 }
 

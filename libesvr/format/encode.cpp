@@ -7,6 +7,7 @@
 
 #include "core/atomic_file.h"
 #include "esvr/container.h"
+#include "esvr/grid_names.h"
 #include "format/bricks_stream.h"
 #include "format/byte_writer.h"
 #include "format/carried_record.h"
@@ -43,7 +44,7 @@ struct SortedGrid {
 };
 
 [[noreturn]] void refuse(const StoredGrid& grid, const std::string& what) {
-  throw RuntimeFailure("cannot store grid '" + grid.descriptor.name + "': " + what);
+  throw RuntimeFailure("cannot store grid '" + shownName(grid.descriptor.name) + "': " + what);
 }
 
 void checkLayers(const StoredGrid& grid) {
@@ -204,7 +205,8 @@ void addCarriedRecords(SectionWriter& out, const std::vector<CarriedGrid>& grids
 void addCarriedBytes(SectionWriter& out, const std::vector<CarriedGrid>& grids, std::size_t first) {
   for (std::size_t c = 0; c < grids.size(); ++c) {
     if (grids[c].bytes.empty())
-      throw RuntimeFailure("cannot store grid '" + grids[c].name + "': its bytes were not read");
+      throw RuntimeFailure("cannot store grid '" + shownName(grids[c].name) +
+                           "': its bytes were not read");
     out.addLarge({SectionKind::kCarriedBytes, std::uint32_t(first + c)}, grids[c].bytes);
   }
 }
@@ -220,7 +222,7 @@ void addVectors(SectionWriter& out, const std::vector<StoredVector>& vectors) {
 void checkVectors(const EsvrFile& file) {
   for (const StoredVector& vector : file.vectors)
     if (const auto fault = faultOf(componentsOf(file, vector)))
-      throw RuntimeFailure("cannot store grid '" + vector.name + "': " + fault->text);
+      throw RuntimeFailure("cannot store grid '" + shownName(vector.name) + "': " + fault->text);
 }
 
 /// What a frame need not store, because the previous one has it too.
@@ -267,6 +269,9 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
   out.setLayout(file.layout);
+  constexpr std::uint16_t kFarBackgrounds = 5;  // the minor version that has them
+  if (std::ranges::any_of(file.grids, &StoredGrid::farBackground))
+    out.requireVersion(kFarBackgrounds);
   if (!inherited.metadata) addFileMetadata(out, file);
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)

@@ -56,7 +56,7 @@ class FrameReader {
       : name_(name), bytes_(bytes), in_(bytes.first(bytes.size() - kFrameSumBytes), name) {}
 
   FrameTable read() {
-    (void)in_.get<std::uint8_t>();
+    if (std::byte(in_.get<std::uint8_t>()) != kFrameMark) in_.fail("no mark of a frame");
     FrameTable table{getInherited(in_), {kVersionMajor, kMinorVersion, bytes_.size(), 0, {}, true}};
     getRows(table.sections);
     getSizes();

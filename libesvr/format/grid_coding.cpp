@@ -10,6 +10,7 @@
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/grid_names.h"
 #include "field/active_region.h"
 #include "format/active_threshold.h"
 #include "format/choose_levels.h"
@@ -160,7 +161,9 @@ RevoxeliseOptions voxelRule(const StoredGrid& grid) {
   return options;
 }
 
-bool followsFromEllipsoids(const StoredGrid& grid) { return !grid.voxels && !grid.residual; }
+bool followsFromEllipsoids(const StoredGrid& grid) {
+  return !grid.voxels && !grid.residual && !grid.farBackground;
+}
 
 std::string whyNoNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
   if (descriptor.gridClass != GridClass::kLevelSet) return "it is no level set";
@@ -350,21 +353,28 @@ void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
   dropInactiveBricks(volume);
 }
 
+/// True if the decoded values are halfs, as those of the source. Exact voxels are the source's own.
+bool isRoundedToHalfs(const StoredGrid& grid) {
+  return grid.descriptor.valueType == ValueType::kHalf &&
+         (!grid.voxels || grid.voxels->form == VoxelForm::kQuantised);
+}
+
 }  // namespace
 
 SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
-  if (options.threshold && grid.voxels)
-    throw UsageError("grid '" + grid.descriptor.name +
+  if (options.threshold && (grid.voxels || grid.farBackground))
+    throw UsageError("grid '" + shownName(grid.descriptor.name) +
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
   if (options.maxBytes != kNoMemoryLimit)
     requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
-                        "grid '" + grid.descriptor.name + "'");
-  if (!grid.voxels) return evaluated(grid, options);
-  SparseVolume volume = volumeOf(*grid.voxels);
-  if (options.box) clip(*options.box, ruleOf(grid), volume);
+                        "grid '" + shownName(grid.descriptor.name) + "'");
+  SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+  if (grid.voxels && options.box) clip(*options.box, ruleOf(grid), volume);
+  if (grid.farBackground) setBackground(float(grid.descriptor.background), volume);
+  if (isRoundedToHalfs(grid)) roundToHalfs(volume);
   return volume;
 }
 

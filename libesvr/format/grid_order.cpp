@@ -1,5 +1,6 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 
 namespace esvr {
 namespace {
@@ -31,9 +32,9 @@ class OthersInOrder {
   void requireComponents(const StoredVector& vector) const {
     const std::size_t grids = file_.grids.size();
     if (vector.first != taken_ || grids - taken_ < kComponents)
-      throw RuntimeFailure("grid '" + vector.name + "' has no three components of its own from " +
-                           std::to_string(vector.first) + " on among " + std::to_string(grids) +
-                           " grids");
+      throw RuntimeFailure(
+          "grid '" + shownName(vector.name) + "' has no three components of its own from " +
+          std::to_string(vector.first) + " on among " + std::to_string(grids) + " grids");
   }
 
   const EsvrFile& file_;
@@ -49,7 +50,7 @@ std::vector<GridOfFile> gridsInOrder(const EsvrFile& file) {
     const std::size_t place = file.carried[c].place;
     while (!others.done() && others.taken() + c < place) order.push_back(others.take());
     if (others.taken() + c != place)
-      throw RuntimeFailure("grid '" + file.carried[c].name + "' cannot have place " +
+      throw RuntimeFailure("grid '" + shownName(file.carried[c].name) + "' cannot have place " +
                            std::to_string(place) + " among " +
                            std::to_string(file.grids.size() + file.carried.size()) + " grids");
     order.push_back({true, c});
@@ -69,6 +70,38 @@ std::vector<std::string> namesInOrder(const EsvrFile& file) {
   std::vector<std::string> names;
   for (const GridOfFile& grid : gridsInOrder(file)) names.push_back(nameOf(file, grid));
   return names;
+}
+
+std::vector<std::string> namesOfStored(const EsvrFile& file) {
+  const GridNames names(namesInOrder(file));
+  std::vector<std::string> stored(file.grids.size());
+  std::size_t place = 0;
+  for (const GridOfFile& grid : gridsInOrder(file)) {
+    if (grid.isVector)
+      for (std::size_t c = 0; c < kComponents; ++c)
+        stored[file.vectors[grid.index].first + c] = names.ofComponent(place, c);
+    else if (!grid.isCarried)
+      stored[grid.index] = names.unique(place);
+    ++place;
+  }
+  return stored;
+}
+
+std::size_t findStored(const EsvrFile& file, const std::string& wanted,
+                       const std::filesystem::path& path) {
+  const GridNames names(namesInOrder(file));
+  const NamedGrid found = names.find(wanted, path);
+  const GridOfFile grid = gridsInOrder(file)[found.place];
+  const std::string where =
+      (path.empty() ? "" : path.string() + ": ") + "grid \"" + names.unique(found.place) + "\" ";
+  if (grid.isCarried)
+    throw BadInput(where +
+                   "is carried unchanged, as the bytes of its .vdb file; esvr2vdb restores it");
+  if (grid.isVector && !found.component)
+    throw BadInput(where + "has vectors; name a component, such as \"" +
+                   names.ofComponent(found.place, 0) + '"');
+  if (found.component && !grid.isVector) throw BadInput(where + "has no components");
+  return grid.isVector ? file.vectors[grid.index].first + *found.component : grid.index;
 }
 
 StoredComponents componentsOf(const EsvrFile& file, const StoredVector& vector) {

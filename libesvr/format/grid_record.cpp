@@ -68,8 +68,14 @@ GridDescriptor getDescriptor(ByteReader& in) {
   return d;
 }
 
+/// Added to the number of a topology if the grid has StoredGrid::farBackground.
+constexpr std::uint8_t kFarBackground = 4;
+enum class TopologyByte : std::uint8_t {
+  kLast = std::uint8_t(TopologyKind::kBlocks) + kFarBackground
+};
+
 void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
-  putEnum(out, grid.topology);
+  out.put(std::uint8_t(std::uint8_t(grid.topology) + (grid.farBackground ? kFarBackground : 0)));
   putEnum(out, grid.withinRange);
   out.put(grid.activeThreshold);
   putBox(out, grid.activeBox);
@@ -78,7 +84,9 @@ void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
   out.put(grid.valueMax);
 }
 void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
-  grid.topology = in.getEnum(TopologyKind::kBlocks, "topology");
+  const auto topology = std::uint8_t(in.getEnum(TopologyByte::kLast, "topology"));
+  grid.topology = TopologyKind(topology % kFarBackground);
+  grid.farBackground = topology >= kFarBackground;
   grid.withinRange = getBool(in, "mark of a range of values");
   grid.activeThreshold = in.get<float>();
   grid.activeBox = getBox(in);

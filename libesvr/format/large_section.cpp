@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "format/checksum.h"
 #include "format/codec.h"
@@ -16,8 +17,10 @@ constexpr std::uint64_t kPieceBytes = 1 << 20;
 void forEachPiece(const ByteSource& source, const SectionEntry& entry,
                   const std::function<void(std::span<const std::byte>)>& use) {
   const std::uint64_t end = entry.offset + entry.storedBytes;
-  for (std::uint64_t at = entry.offset; at < end; at += std::min(kPieceBytes, end - at))
+  for (std::uint64_t at = entry.offset; at < end; at += std::min(kPieceBytes, end - at)) {
+    throwIfCancelled();
     use(source.read(at, std::min(kPieceBytes, end - at)));
+  }
 }
 
 VoxelArray<std::byte> readRaw(const ByteSource& source, const SectionEntry& entry,
@@ -35,6 +38,7 @@ VoxelArray<std::byte> readBlosc(const ByteSource& source, const SectionEntry& en
   std::span<std::byte> left(content);
   std::uint64_t at = 0;
   while (at < stored.size() || !left.empty()) {
+    throwIfCancelled();
     const auto buffer = stored.read(at, storedBytesOf(stored.read(at, kBloscHeaderBytes)));
     left = left.subspan(decompressBuffer(buffer, left, where));
     at += buffer.size();

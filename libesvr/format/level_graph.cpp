@@ -1,11 +1,10 @@
 #include "format/level_graph.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 
 #include "core/brick_index.h"
+#include "core/parallel.h"
 
 namespace esvr::format {
 namespace {
@@ -78,7 +77,7 @@ void LevelGraph::improve(double price, std::vector<std::uint8_t>& levels) const 
   for (int round = 0; round < kMaxRounds; ++round) {
     std::atomic<bool> changed = false;
     for (const auto& nodes : byColor_)
-      tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) {
+      parallelFor(std::size_t{0}, nodes.size(), [&](std::size_t n) {
         const std::size_t node = nodes[n];
         if (!isDue(node, round - 1, changes)) return;
         const std::uint8_t level = best(node, price, levels);

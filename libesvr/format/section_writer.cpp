@@ -70,14 +70,14 @@ std::span<const std::byte> SectionWriter::contentOfRow(std::size_t row) const {
 }
 
 SectionWriter::Arrangement SectionWriter::plain() const {
-  Arrangement all{{.versionMinor = 0}};
+  Arrangement all{{.versionMinor = leastVersion_}};
   for (std::size_t i = 0; i < table_.entries.size(); ++i)
     all.add(table_.entries[i], contentOfRow(i), contentOf_[i]);
   return all;
 }
 
 SectionWriter::Arrangement SectionWriter::packed() const {
-  Arrangement small{{.versionMinor = 0}}, large{{.versionMinor = 0}};
+  Arrangement small{{.versionMinor = leastVersion_}}, large{{.versionMinor = 0}};
   for (std::size_t i = 0; i < table_.entries.size(); ++i) {
     const auto content = contentOfRow(i);
     auto& part = content.size() <= kLargestPacked ? small : large;

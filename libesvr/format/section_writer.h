@@ -41,6 +41,12 @@ class SectionWriter {
   void setLayout(FileLayout layout) { layout_ = layout; }
   [[nodiscard]] FileLayout layout() const { return layout_; }
 
+  /// Gives the file at least this minor version, which something in its sections needs.
+  void requireVersion(std::uint16_t minor) {
+    leastVersion_ = std::max(leastVersion_, minor);
+    table_.versionMinor = std::max(table_.versionMinor, minor);
+  }
+
   using Sink = std::function<void(std::span<const std::byte>)>;
   /// Passes the file to the sink, piece by piece. Sections that are stored alike share their bytes.
   /// \return the size of the file
@@ -85,6 +91,7 @@ class SectionWriter {
   [[nodiscard]] Arrangement arranged() const;
 
   FileLayout layout_ = FileLayout::kPlain;
+  std::uint16_t leastVersion_ = 0;
   SectionTable table_{.versionMinor = 0};             ///< the lowest version that has all kinds
   std::vector<Content> contents_;                     ///< stored bytes without repetitions
   std::vector<std::size_t> contentOf_;                ///< index in contents_ of each entry

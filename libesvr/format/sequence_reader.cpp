@@ -66,8 +66,14 @@ class SequenceReader::File {
   /// A frame that cannot be decoded leaves none, because it may need the one before it again.
   void decode(std::size_t i) {
     lastDecoded_.reset();
-    EsvrFile frame = decodeFrame(bytesOf(i), frameName(source_.name(), frames_[i].number), limits_,
-                                 frames_[i].dependsOnPrevious ? &*decoded_ : nullptr);
+    const bool depends = frames_[i].dependsOnPrevious;
+    if (!depends) decoded_.reset();
+    // Both frames are in memory until the new one is complete.
+    ReadLimits left = limits_;
+    if (depends && left.maxBytes != kNoMemoryLimit)
+      left.maxBytes -= std::min(left.maxBytes, contentBytes(*decoded_));
+    EsvrFile frame = decodeFrame(bytesOf(i), frameName(source_.name(), frames_[i].number), left,
+                                 depends ? &*decoded_ : nullptr);
     decoded_ = std::move(frame);
     lastDecoded_ = i;
   }

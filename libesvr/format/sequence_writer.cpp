@@ -15,15 +15,19 @@ namespace {
 using namespace format;
 
 PartialStart startOf(PartialSequence partial) {
-  switch (partial) {
-    case PartialSequence::kRefuse:
-      return PartialStart::kRefuse;
-    case PartialSequence::kReplace:
-      return PartialStart::kReplace;
-    case PartialSequence::kResume:
-      break;
-  }
-  return PartialStart::kContinue;
+  return partial == PartialSequence::kRefuse ? PartialStart::kRefuse : PartialStart::kContinue;
+}
+
+/// The file of that name may be somebody else's.
+void requireOurs(const PartialFile& file, PartialSequence partial) {
+  const FileSource source(file.path());
+  const auto expected = std::as_bytes(std::span(kMagic));
+  const auto begin = source.read(0, std::min<std::uint64_t>(source.size(), expected.size()));
+  if (std::ranges::equal(begin, expected.first(begin.size()))) return;
+  const std::string text = "cannot write " + file.path().string() +
+                           ": it is there, and is no part of an .esvr file; remove it or rename it";
+  if (partial == PartialSequence::kResume) throw BadInput(text);
+  throw RuntimeFailure(text);
 }
 
 }  // namespace
@@ -32,7 +36,9 @@ class SequenceWriter::File {
  public:
   File(const std::filesystem::path& path, const SequenceWriteOptions& options)
       : name_(path.string()), file_(path, options.overwrite, startOf(options.partial)) {
-    if (file_.size() > kHeaderBytes) groups_ = findGroups(FileSource(file_.path()));
+    requireOurs(file_, options.partial);
+    if (options.partial == PartialSequence::kResume && file_.size() > kHeaderBytes)
+      groups_ = findGroups(FileSource(file_.path()));
     dropGroups(groups_.size());
   }
   ~File() {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <initializer_list>
 #include <span>
+#include <string>
+#include <string_view>
 
 namespace esvr::format {
 namespace {
@@ -47,7 +49,34 @@ std::optional<Fault> extremeScale(const std::array<std::vector<float>, 3>& logSc
   return std::nullopt;
 }
 
+/// The bytes of OpenVDB's maps, which consist of vectors and of matrices of doubles. A frustum holds
+/// another map, so that only its smallest size is known.
+struct MapSize {
+  std::string_view type;
+  std::size_t bytes = 0;
+};
+constexpr std::size_t kVector = 3 * sizeof(double), kMatrix = 16 * sizeof(double);
+constexpr std::array kMapSizes{MapSize{"UniformScaleMap", 5 * kVector},
+                               MapSize{"ScaleMap", 5 * kVector},
+                               MapSize{"TranslationMap", kVector},
+                               MapSize{"UniformScaleTranslateMap", 6 * kVector},
+                               MapSize{"ScaleTranslateMap", 6 * kVector},
+                               MapSize{"UnitaryMap", kMatrix},
+                               MapSize{"AffineMap", kMatrix}};
+constexpr MapSize kFrustum{"NonlinearFrustumMap", 3 * kVector + kVector};
+
 }  // namespace
+
+std::optional<Fault> mapFaultOf(const Transform& transform) {
+  const std::size_t bytes = transform.map.size();
+  const auto known = std::ranges::find(kMapSizes, transform.mapType, &MapSize::type);
+  const bool isGood = transform.mapType == kFrustum.type
+                          ? bytes > kFrustum.bytes
+                          : known == kMapSizes.end() || bytes == known->bytes;
+  if (isGood) return std::nullopt;
+  return Fault{SectionKind::kGrid, "the transform is damaged: " + std::to_string(bytes) +
+                                       " bytes are not a map of type " + transform.mapType};
+}
 
 std::optional<Fault> faultOf(const StoredGrid& grid) {
   const auto fault = [](const char* text) { return Fault{SectionKind::kGrid, text}; };
@@ -56,6 +85,9 @@ std::optional<Fault> faultOf(const StoredGrid& grid) {
   if (!validAffine(grid.descriptor.transform)) return fault("the affine map is not finite");
   if (!validKernel(grid.field.kernel))
     return fault("the kernel's kappa is not finite or its epsilon not between 0 and 1");
+  if (grid.farBackground && grid.topology != TopologyKind::kMask &&
+      grid.topology != TopologyKind::kThreshold)
+    return fault("a far background needs a mask or voxels");
   if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
   if (grid.topology == TopologyKind::kBlocks && !(grid.activeThreshold > 0.0f))
     return fault("the threshold of blocks is not above 0");

@@ -15,6 +15,10 @@ struct Fault {
   std::string text;
 };
 
+/// A map whose number of bytes is not that of its type, if the type is one of OpenVDB's own. Grids
+/// with such a map can be read, but no VDB file can be made of them.
+[[nodiscard]] std::optional<Fault> mapFaultOf(const Transform& transform);
+
 /// Checks all but bricks, curve and chunks: numbers must be finite, the kernel must be possible to
 /// evaluate, and ranges must be in order.
 [[nodiscard]] std::optional<Fault> faultOf(const StoredGrid& grid);

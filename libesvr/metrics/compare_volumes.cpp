@@ -91,11 +91,11 @@ Comparison compared(const SparseVolume& reference, const SparseVolume& candidate
                     const CompareOptions& options) {
   if (activeVoxelCount(reference) == 0) throw BadInput("the reference has no active voxel");
   Comparison c;
-  c.peak = choosePeak(reference, options);
   c.domain = {chooseBox(reference, options), {reference.background, candidate.background}};
   c.pairs = metrics::pairBricks(reference, candidate);
   c.sums = metrics::sumErrors(c.pairs, c.domain);
   refuseNonFinite(c.sums, c.domain.backgrounds);
+  c.peak = choosePeak(reference, options);
   addEmptySpace(c.sums, c.pairs, c.domain);
   return c;
 }
@@ -123,9 +123,12 @@ VolumeMetrics metricsOf(const Comparison& c) {
 }  // namespace
 
 double peakOf(const SparseVolume& reference) {
+  return peakOf(activeRange(reference), reference.background);
+}
+
+double valueRangeOf(const SparseVolume& reference) {
   const ValueRange range = activeRange(reference);
-  const double peak = range.max > 0.0f ? range.max : -double(range.min);
-  return peak > 0.0 ? peak : 1.0;
+  return double(range.max) - double(range.min);
 }
 
 double psnr(double mse, double peak) {

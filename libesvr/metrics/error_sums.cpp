@@ -1,10 +1,9 @@
 #include "metrics/error_sums.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <bit>
 #include <cmath>
+
+#include "core/parallel.h"
 
 namespace esvr::metrics {
 namespace {
@@ -91,7 +90,7 @@ ErrorSums joined(ErrorSums a, const ErrorSums& b) {
 
 ErrorSums sumErrors(std::span<const BrickPair> pairs, const ErrorDomain& domain) {
   using Range = tbb::blocked_range<std::size_t>;
-  return tbb::parallel_deterministic_reduce(
+  return parallelDeterministicReduce(
       Range(0, pairs.size(), kPairsPerTask), ErrorSums{},
       [&](const Range& range, ErrorSums sums) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)

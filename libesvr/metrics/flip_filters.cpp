@@ -1,12 +1,11 @@
 #include "metrics/flip_filters.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+
+#include "core/parallel.h"
 
 namespace esvr::metrics {
 namespace {
@@ -83,7 +82,7 @@ void filterRow(const double* from, int width, const Taps& taps, double* to) {
 template <class OfRow>
 Plane rowByRow(const Plane& like, const OfRow& ofRow) {
   Plane result{like.width, like.height, std::vector<double>(like.values.size())};
-  tbb::parallel_for(tbb::blocked_range<int>(0, like.height, kRowsPerTask), [&](const auto& range) {
+  parallelFor(tbb::blocked_range<int>(0, like.height, kRowsPerTask), [&](const auto& range) {
     for (int y = range.begin(); y != range.end(); ++y)
       ofRow(y, &result.values[std::size_t(y) * like.width]);
   });

@@ -1,14 +1,11 @@
 #include "esvr/image_metrics.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "field/ssim_window.h"
@@ -107,7 +104,7 @@ double ssimOfRow(const Channel& a, const Channel& b, const Window& window, int y
 
 template <class OfRow>
 double sumOverRows(int rows, OfRow&& ofRow) {
-  return tbb::parallel_deterministic_reduce(
+  return parallelDeterministicReduce(
       Rows(0, rows, kRowsPerTask), 0.0,
       [&](const Rows& range, double sum) {
         for (int y = range.begin(); y != range.end(); ++y) sum += ofRow(y);

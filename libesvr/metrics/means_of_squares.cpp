@@ -1,5 +1,5 @@
-#include <tbb/parallel_for.h>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/image.h"
 
@@ -28,7 +28,7 @@ Image meansOfSquares(const Image& image, int side) {
                      std::to_string(side));
   Image means{image.width / side, image.height / side, {}};
   means.rgba.resize(offsetOf(means, 0, means.height));
-  tbb::parallel_for(0, means.height, [&](int row) {
+  parallelFor(0, means.height, [&](int row) {
     for (int column = 0; column < means.width; ++column) {
       double sums[kPixelChannels]{};
       addSquare(image, side, column, row, sums);

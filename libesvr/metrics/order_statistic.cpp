@@ -1,11 +1,10 @@
 #include "metrics/order_statistic.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
-
 #include <bit>
 #include <cmath>
 #include <vector>
+
+#include "core/parallel.h"
 
 namespace esvr::metrics {
 namespace {
@@ -53,7 +52,7 @@ Histogram added(Histogram a, const Histogram& b) {
 
 Histogram countDigits(std::span<const BrickPair> pairs, const Prefix& prefix) {
   using Range = tbb::blocked_range<std::size_t>;
-  return tbb::parallel_reduce(
+  return parallelReduce(
       Range(0, pairs.size(), kPairsPerCountingTask), Histogram(kDigits),
       [&](const Range& range, Histogram counts) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)

@@ -1,5 +1,3 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "field/dilate_bricks.h"
@@ -181,7 +180,7 @@ std::vector<Coord> bricksToVisit(std::span<const BrickPair> pairs, const Box& bo
 
 double sumExcess(std::span<const Coord> bricks, const SsimScene& scene) {
   using Range = tbb::blocked_range<std::size_t>;
-  return tbb::parallel_deterministic_reduce(
+  return parallelDeterministicReduce(
       Range(0, bricks.size(), kBricksPerTask), 0.0,
       [&](const Range& range, double sum) {
         const auto work = std::make_unique<SsimBrick>(scene);  // too large for a worker's stack

@@ -79,7 +79,7 @@ void putPoints(Json& json, const OpacityCurve& curve) {
 
 /// The look that esvr-render gives a grid without options (render/render_options.cpp).
 TransferFunction usualLook(const StoredGrid& grid) {
-  const float background = grid.field.background;
+  const float background = float(grid.descriptor.background);
   if (grid.descriptor.gridClass == GridClass::kLevelSet && background > 0.0f)
     return levelSetSurface(double(background));
   const ValueRange range{std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
@@ -129,7 +129,7 @@ void putGrid(Json& json, const StoredGrid& grid) {
   json.name("unit").string(unitOf(grid.descriptor));
   json.name("ellipsoids").number(double(grid.field.ellipsoidCount()));
   json.name("activeVoxels").number(double(grid.activeVoxels));
-  json.name("background").number(grid.field.background);
+  json.name("background").number(float(grid.descriptor.background));
   putBox(json.name("box"), grid.activeBox);
   putVoxelSize(json.name("voxelSize"), grid.descriptor.transform);
   json.name("range").list(std::initializer_list<double>{grid.valueMin, grid.valueMax});

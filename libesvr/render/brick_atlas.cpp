@@ -1,10 +1,9 @@
 #include "render/brick_atlas.h"
 
-#include <tbb/parallel_for.h>
-
 #include <array>
 
 #include "core/brick_index.h"
+#include "core/parallel.h"
 #include "render/cell_bricks.h"
 #include "render/cell_corners.h"
 
@@ -43,7 +42,7 @@ std::vector<Coord> placesOf(const SparseVolume& volume) {
 /// The candidates that have a voxel other than the background.
 std::vector<Coord> occupied(const CellReader& reader, const std::vector<Coord>& all) {
   std::vector<char> any(all.size());
-  tbb::parallel_for(std::size_t(0), all.size(), [&](std::size_t i) {
+  parallelFor(std::size_t(0), all.size(), [&](std::size_t i) {
     std::array<float, kCellBrickVoxels> values;
     any[i] = reader.read(all[i], values) ? 1 : 0;
   });
@@ -67,7 +66,7 @@ BrickAtlas makeBrickAtlas(const SparseVolume& volume, std::uint32_t first) {
   BrickAtlas atlas{makeBrickTable(occupied(reader, bricksWithCells(placesOf(volume))), first), {}};
   const std::size_t count = atlas.table.bricks.size();
   atlas.values.resize(count * kCellBrickVoxels);
-  tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+  parallelFor(std::size_t(0), count, [&](std::size_t i) {
     (void)reader.read(
         atlas.table.place(i),
         std::span<float, kCellBrickVoxels>(&atlas.values[i * kCellBrickVoxels], kCellBrickVoxels));

@@ -22,7 +22,9 @@ struct CoverView {
 
   /// \param along  distance from the eye; orthographic: from its plane
   [[nodiscard]] ESVR_HD int sampleAt(double along) const {
-    return int(std::floor(along / step - firstSample));
+    constexpr double kMost = 1e9;  // beyond all samples of the volume
+    const double n = std::floor(along / step - firstSample);
+    return int(n < -kMost ? -kMost : (n > kMost ? kMost : n));
   }
 };
 
@@ -34,8 +36,13 @@ ESVR_HD inline Vec3 cornerOf(const Coord& brick, int corner) {
           double((brick.z + step.z) * kBrickSide)};
 }
 
-ESVR_HD inline double distanceTo(const Coord& brick, const Vec3& eye) {
-  const Vec3 low = cornerOf(brick, 0), high = cornerOf(brick, kCellCorners - 1);
+/// A distance from the eye that is at most that of the brick.
+ESVR_HD inline double distanceTo(const Coord& brick, const View& view) {
+  const Vec3 low = cornerOf(brick, 0), high = cornerOf(brick, kCellCorners - 1), &eye = view.eye;
+  if (!view.isCube) {
+    const Vec3 middle = view.coordinates(difference(scaled(sum(low, high), 0.5), eye));
+    return std::sqrt(inner(middle, middle)) - kBrickSide * view.halfDiagonal;
+  }
   double squares = 0.0;
   for (int a = 0; a < 3; ++a) {
     const double below = low[a] - eye[a], above = eye[a] - high[a];
@@ -66,7 +73,7 @@ ESVR_HD inline BrickCover coverOfCorner(const CoverView& v, const Coord& brick, 
 /// The first sample that may lie in a brick, in a perspective view. The brick may be nearer than its
 /// corners.
 ESVR_HD inline int firstSampleOf(const CoverView& v, const Coord& brick) {
-  return v.sampleAt(brick_cover::distanceTo(brick, v.view.eye));
+  return v.sampleAt(brick_cover::distanceTo(brick, v.view));
 }
 
 /// The tiles of a picture that a cover meets; none if `columns` or `rows` is not positive.

@@ -175,7 +175,7 @@ struct UnlitSamples {
 /// Adds samples whose colors are lit by their gradients.
 struct LitSamples {
   LightRule light;
-  FloatPlace direction;  ///< of the ray, of unit length
+  FloatPlace direction;  ///< of the ray in the camera's space, of unit length
 
   ESVR_HD void add(const SampleRule& rule, const BrickSample& sample, RayProgress& at) const {
     const FloatPlace gradient = brick_march::gradientIn(sample.values, sample.place, sample.low);

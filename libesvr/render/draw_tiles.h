@@ -2,10 +2,10 @@
 /// Draws the tiles of a picture in parallel on the CPU.
 
 #include <tbb/blocked_range2d.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 
+#include "core/parallel.h"
 #include "render/picture.h"
 #include "render/tile_ranges.h"
 
@@ -25,12 +25,13 @@ void drawTiles(const RenderOptions& options, const TileRanges& ranges, Picture& 
     const int pastColumn = std::min((tileColumn + 1) * kSide, options.resolution.width);
     const int pastRow = std::min((tileRow + 1) * kSide, options.resolution.height);
     for (int row = tileRow * kSide; row < pastRow; ++row)
-      for (int column = tileColumn * kSide; column < pastColumn; ++column)
+      for (int column = tileColumn * kSide; column < pastColumn; ++column) {
+        checkCancelled(options);  // a single ray may take a tenth of a second
         picture.set(column, row, colorOf(column, row, samples));
+      }
   };
   using Tiles = tbb::blocked_range2d<int>;
-  tbb::parallel_for(Tiles(0, ranges.rows(), 0, ranges.columns()), [&](const Tiles& tiles) {
-    checkCancelled(options);
+  parallelFor(Tiles(0, ranges.rows(), 0, ranges.columns()), [&](const Tiles& tiles) {
     for (int row = tiles.rows().begin(); row != tiles.rows().end(); ++row)
       for (int column = tiles.cols().begin(); column != tiles.cols().end(); ++column)
         drawTile(column, row);

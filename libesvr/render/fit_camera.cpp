@@ -11,15 +11,27 @@ namespace {
 
 constexpr Vec3 kFromCenter{0.5, 0.35, 1.0};  // default direction from the center to the eye
 
-Vec3 middle(const Box& box) {
-  return {(double(box.min.x) + box.max.x) / 2, (double(box.min.y) + box.max.y) / 2,
-          (double(box.min.z) + box.max.z) / 2};
+/// The middle of a box in the camera's space.
+Vec3 middle(const Box& box, const VoxelShape& voxel) {
+  return voxel.place({(double(box.min.x) + box.max.x) / 2, (double(box.min.y) + box.max.y) / 2,
+                      (double(box.min.z) + box.max.z) / 2});
 }
 
-/// Lengths of the sides, if each voxel extends by `margin` to each side of its index.
+/// Lengths of the sides in voxels, if each voxel extends by `margin` to each side of its index.
 Vec3 sides(const Box& box, double margin) {
   return {double(box.max.x) - box.min.x + 2 * margin, double(box.max.y) - box.min.y + 2 * margin,
           double(box.max.z) - box.min.z + 2 * margin};
+}
+
+/// Radius of the sphere around a box with these sides, in the camera's space.
+double radiusOf(const Vec3& sides, const VoxelShape& voxel) {
+  if (voxel.isCube()) return length(sides) / 2;
+  double radius = 0.0;
+  for (unsigned corner = 0; corner < 4; ++corner)
+    radius = std::max(radius, length(voxel.place({corner & 1u ? -sides[0] : sides[0],
+                                                  corner & 2u ? -sides[1] : sides[1], sides[2]})) /
+                                  2);
+  return radius;
 }
 
 /// Distance from the eye at which a sphere just fits into the shorter side of the picture.
@@ -38,8 +50,9 @@ Vec3 defaultUp(const Camera& camera) {
 Camera aroundSphere(const Box& box, const CameraWish& wish, Resolution resolution) {
   constexpr double kHalfVoxel = 0.5;
   const double aspect = double(resolution.width) / resolution.height;
-  const double radius = length(sides(box, kHalfVoxel)) / 2;
+  const double radius = radiusOf(sides(box, kHalfVoxel), wish.voxel);
   Camera camera;
+  camera.voxel = wish.voxel;
   camera.projection = wish.projection;
   camera.fov = wish.fov.value_or(camera.fov);
   camera.height = wish.height.value_or(2.0 * radius / std::min(1.0, aspect));
@@ -59,11 +72,11 @@ class Corners {
       : axis_(unit(camera.up)), turning_(turning) {
     constexpr double kToNeighbour = 1.0;  // values are interpolated up to the next voxels
     const Vec3 half = scaled(sides(box, kToNeighbour), 0.5);
-    const Vec3 from = difference(middle(box), camera.center);
+    const Vec3 from = difference(middle(box, camera.voxel), camera.center);
     for (unsigned corner = 0; corner < 8; ++corner)
-      places_.push_back(
-          sum(from, {corner & 1u ? half[0] : -half[0], corner & 2u ? half[1] : -half[1],
-                     corner & 4u ? half[2] : -half[2]}));
+      places_.push_back(sum(from, camera.voxel.place({corner & 1u ? half[0] : -half[0],
+                                                      corner & 2u ? half[1] : -half[1],
+                                                      corner & 4u ? half[2] : -half[2]})));
   }
 
   /// The largest inner product of a vector and a corner.
@@ -138,7 +151,9 @@ std::array<Span, 2> spansOf(const View& view, const CameraWish& wish) {
 Camera closer(const Box& box, Camera camera, const CameraWish& wish, Resolution resolution) {
   const bool perspective = camera.projection == Projection::kPerspective;
   if (!perspective) camera.height = 2.0;  // makes 1 the size of the picture
-  const View view(camera, resolution);
+  Camera ofCubes = camera;                // its axes are those of the camera's space
+  ofCubes.voxel = {};
+  const View view(ofCubes, resolution);
   const Corners corners(box, camera, wish.framing == Framing::kTurn);
   const auto spans = spansOf(view, wish);
   const Vec3 forward = perspective ? view.forward : Vec3{};
@@ -154,7 +169,9 @@ Camera closer(const Box& box, Camera camera, const CameraWish& wish, Resolution 
 
 }  // namespace
 
-Vec3 pivotOf(const Box& box, const CameraWish& wish) { return wish.center.value_or(middle(box)); }
+Vec3 pivotOf(const Box& box, const CameraWish& wish) {
+  return wish.center.value_or(middle(box, wish.voxel));
+}
 
 Camera fitCamera(const Box& box, const CameraWish& wish, Resolution resolution) {
   const Camera camera = aroundSphere(box, wish, resolution);

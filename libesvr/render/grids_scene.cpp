@@ -14,7 +14,8 @@ namespace {
 
 bool isEmpty(const PlaceBox& box) { return !(box.low[0] < box.high[0]); }
 
-/// A box around the cells of all grids, in index space.
+}  // namespace
+
 PlaceBox boxAround(const std::vector<GridTable>& grids) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
   PlaceBox box{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
@@ -28,6 +29,8 @@ PlaceBox boxAround(const std::vector<GridTable>& grids) {
   }
   return box;
 }
+
+namespace {
 
 /// The origin of the first grid that has cells.
 Coord originOf(const std::vector<GridTable>& grids) {
@@ -51,9 +54,11 @@ GridLook lookOf(const RenderOptions& options, std::size_t grid) {
 GridsScene gridsScene(const RenderOptions& options, const std::vector<GridTable>& grids) {
   const Coord origin = originOf(grids);
   const Vec3 from = pointOf(origin);
-  GridsScene scene{
-      sceneOfLevel(marchScene(options, sampleRule(options, {}, 0.0f)), LevelFrame{0}, origin), {}};
   const PlaceBox box = boxAround(grids);
+  GridsScene scene{
+      sceneOfLevel(marchScene(options, viewOf(options, box), sampleRule(options, {}, 0.0f)),
+                   LevelFrame{0}, origin),
+      {}};
   scene.scene.box = {difference(box.low, from), difference(box.high, from)};
   for (std::size_t g = 0; g < grids.size(); ++g)
     scene.grids[g] = {grids[g].table, grids[g].transfer, grids[g].background,

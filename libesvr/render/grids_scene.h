@@ -23,6 +23,9 @@ struct GridTable {
   float background;
 };
 
+/// A box around the cells of all grids, in index space; empty if no grid has cells.
+[[nodiscard]] PlaceBox boxAround(const std::vector<GridTable>& grids);
+
 /// \param options  as checkGridsOptions() requires
 /// \param grids    at least one of them has cells
 [[nodiscard]] GridsScene gridsScene(const RenderOptions& options,

@@ -94,7 +94,8 @@ ESVR_HD inline bool marchLevel(const LevelScene& s, int place, const Slots& slot
   const MarchSamples samples = samplesOf(scene, column, row, rangeOf(s, place, wanted));
   const BrickTableView& table = s.levels[place].table;
   if constexpr (kCode.isShaded) {
-    const LitSamples lit{scene.light, floatPlace(scene.view.ray(column, row).direction)};
+    const Vec3 direction = scene.view.ray(column, row).direction;
+    const LitSamples lit{scene.light, floatPlace(scene.view.inCameraSpace(direction))};
     return marchBricks(table, slots, scene, samples, at, visitor, lit);
   } else {
     return marchBricks(table, slots, scene, samples, at, visitor);

@@ -44,9 +44,10 @@ ESVR_HD inline MarchScene sceneOfLevel(const MarchScene& scene, LevelFrame frame
                                        const Coord& origin) {
   const Vec3 from = pointOf(origin);
   MarchScene s = scene;
+  const double perSide = 1.0 / frame.side();
   s.view.eye = difference(frame.place(scene.view.eye), from);
+  s.view.before *= perSide;
   if (!s.view.perspective) {
-    const double perSide = 1.0 / frame.side();
     s.view.pixel *= perSide, s.view.left *= perSide, s.view.top *= perSide;
   }
   s.clip.box = {difference(frame.place(scene.clip.box.low), from),

@@ -26,7 +26,7 @@ struct MarchScene {
 struct MarchSamples {
   FloatPlace first, apart;
   FloatPlace perVoxel;  ///< samples in a step of a voxel along each axis; 0 where they do not move
-  float number;         ///< number of sample 0, counted from the eye
+  float number;         ///< number of sample 0, counted from the camera's eye
   int begin, end;
 
   [[nodiscard]] ESVR_HD FloatPlace at(int i) const {
@@ -59,9 +59,9 @@ ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
   return {floatPlace(sum(ray.origin, scaled(ray.direction, range.first * s.step))),
           apart,
           {samplesPerVoxel(apart.x), samplesPerVoxel(apart.y), samplesPerVoxel(apart.z)},
-          float(range.first),
-          int(both.first - range.first),
-          int(both.last - range.first) + 1};
+          float(range.first + s.view.before / s.step),
+          range.countTo(both.first),
+          range.countTo(both.last) + 1};
 }
 
 namespace march {

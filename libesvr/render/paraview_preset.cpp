@@ -1,10 +1,10 @@
 #include <algorithm>
-#include <fstream>
-#include <iterator>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "core/read_input.h"
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
 #include "render/paraview_xml.h"
@@ -14,10 +14,46 @@ namespace {
 
 using nlohmann::json;
 
-std::string contentOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw BadInput("cannot read " + path.string());
-  return {std::istreambuf_iterator<char>(file), {}};
+void appendUtf8(std::uint32_t code, std::string& to) {
+  const auto put = [&](std::uint32_t byte) { to += char(static_cast<unsigned char>(byte)); };
+  const auto putTail = [&](int shift) { put(0x80u | (code >> shift & 0x3fu)); };
+  if (code < 0x80u) return put(code);
+  if (code < 0x800u) {
+    put(0xc0u | code >> 6);
+  } else if (code < 0x10000u) {
+    put(0xe0u | code >> 12), putTail(6);
+  } else {
+    put(0xf0u | code >> 18), putTail(12), putTail(6);
+  }
+  putTail(0);
+}
+
+/// UTF-16 as UTF-8. \param low  place of the low byte in each unit of two bytes
+std::string fromUtf16(const std::string& text, std::size_t low) {
+  std::string utf8;
+  const auto unit = [&](std::size_t at) {
+    return std::uint32_t(static_cast<unsigned char>(text[at + low])) |
+           std::uint32_t(static_cast<unsigned char>(text[at + 1 - low])) << 8;
+  };
+  for (std::size_t at = 0; at + 1 < text.size(); at += 2) {
+    std::uint32_t code = unit(at);
+    const bool isPair = code >= 0xd800u && code < 0xdc00u && at + 3 < text.size();
+    if (isPair)
+      at += 2, code = 0x10000u + ((code - 0xd800u) << 10) + ((unit(at) - 0xdc00u) & 0x3ffu);
+    appendUtf8(code, utf8);
+  }
+  return utf8;
+}
+
+/// The text as UTF-8 without a byte order mark. Programs on Windows write UTF-16, or the mark.
+std::string asUtf8(std::string text) {
+  if (text.starts_with("\xff\xfe")) return fromUtf16(text.substr(2), 0);
+  if (text.starts_with("\xfe\xff")) return fromUtf16(text.substr(2), 1);
+  if (text.starts_with("\xef\xbb\xbf")) return text.substr(3);
+  // UTF-16 without a mark: the first character, which is '<', '[' or '{', has a byte of 0.
+  if (text.size() > 1 && text[1] == 0 && text[0] != 0) return fromUtf16(text, 0);
+  if (text.size() > 1 && text[0] == 0 && text[1] != 0) return fromUtf16(text, 1);
+  return text;
 }
 
 bool isXml(const std::string& text) {
@@ -25,9 +61,11 @@ bool isXml(const std::string& text) {
   return first != std::string::npos && text[first] == '<';
 }
 
-json parsed(const std::string& text, const std::string& source) {
+json parsed(const std::string& original, const std::string& source) {
+  constexpr bool kThrows = false, kSkipsComments = true;
+  const std::string text = asUtf8(original);
   if (isXml(text)) return presetsOfXml(text, source);
-  json content = json::parse(text, nullptr, false);
+  json content = json::parse(text, nullptr, kThrows, kSkipsComments);
   if (content.is_discarded()) throw BadInput(source + ": not JSON");
   return content.is_array() ? content : json::array({std::move(content)});
 }
@@ -37,7 +75,16 @@ std::string nameOf(const json& preset) {
   return name != preset.end() && name->is_string() ? name->get<std::string>() : "";
 }
 
-bool hasColors(const json& preset) { return preset.is_object() && preset.contains("RGBPoints"); }
+/// False for members that are missing or null, which mean the same.
+bool has(const json& preset, const char* key) {
+  const auto found = preset.find(key);
+  return found != preset.end() && !found->is_null();
+}
+
+/// A preset of colors for categories (IndexedColors) may have an empty list of points.
+bool hasColors(const json& preset) {
+  return preset.is_object() && has(preset, "RGBPoints") && !preset["RGBPoints"].empty();
+}
 
 std::string listed(const json& presets) {
   std::string names;
@@ -65,6 +112,17 @@ std::vector<double> numbers(const json& preset, const char* key, std::size_t row
   return array.get<std::vector<double>>();
 }
 
+/// Clamps a channel or an opacity that is outside 0 to 1 by rounding only.
+double withinRounding(double v) {
+  constexpr double kRounding = 1e-6;  // of float32 and of decimal texts with six digits
+  if (v < 0.0 && v >= -kRounding) return 0.0;
+  return v > 1.0 && v <= 1.0 + kRounding ? 1.0 : v;
+}
+
+Rgb colorOf(double r, double g, double b) {
+  return {withinRounding(r), withinRounding(g), withinRounding(b)};
+}
+
 template <class Point>
 void sortByX(std::vector<Point>& points) {
   std::stable_sort(points.begin(), points.end(),
@@ -75,7 +133,7 @@ std::vector<ColorPoint> colorPoints(const json& preset) {
   const auto v = numbers(preset, "RGBPoints", 4);
   std::vector<ColorPoint> points;
   for (std::size_t i = 0; i < v.size(); i += 4)
-    points.push_back({v[i], {v[i + 1], v[i + 2], v[i + 3]}});
+    points.push_back({v[i], colorOf(v[i + 1], v[i + 2], v[i + 3])});
   sortByX(points);
   return points;
 }
@@ -84,7 +142,8 @@ OpacityCurve opacityPoints(const json& preset) {
   const auto v = numbers(preset, "Points", 4);
   OpacityCurve points;
   for (std::size_t i = 0; i < v.size(); i += 4)
-    points.push_back({v[i], v[i + 1], v[i + 2], v[i + 3]});
+    points.push_back(
+        {v[i], withinRounding(v[i + 1]), withinRounding(v[i + 2]), withinRounding(v[i + 3])});
   sortByX(points);
   return points;
 }
@@ -96,15 +155,21 @@ bool flag(const json& preset, const char* key) {
 }
 
 ColorSpace spaceOf(const json& preset) {
-  const std::string name = preset.contains("ColorSpace") && preset["ColorSpace"].is_string()
-                               ? preset["ColorSpace"].get<std::string>()
-                               : "RGB";
-  if (name == "RGB") return ColorSpace::kRgb;
-  if (name == "HSV") return flag(preset, "HSVWrap") ? ColorSpace::kHsvWrap : ColorSpace::kHsv;
-  if (name == "Lab" || name == "CIELAB") return ColorSpace::kLab;
-  if (name == "Diverging") return ColorSpace::kDiverging;
-  if (name == "Step") return ColorSpace::kStep;
-  throw BadInput("ColorSpace \"" + name + "\" is none of RGB, HSV, Lab, Diverging, Step");
+  const auto found = preset.find("ColorSpace");
+  const std::string given =
+      found != preset.end() && found->is_string() ? found->get<std::string>() : "RGB";
+  std::string name = given;
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  if (name == "rgb") return ColorSpace::kRgb;
+  if (name == "hsv") return flag(preset, "HSVWrap") ? ColorSpace::kHsvWrap : ColorSpace::kHsv;
+  // VTK mixes colors of this space along straight lines in CIELAB, too; CIEDE2000 is its measure of how
+  // far apart two colors are, by which it spaces them.
+  if (name == "lab" || name == "cielab" || name == "lab/ciede2000") return ColorSpace::kLab;
+  if (name == "diverging") return ColorSpace::kDiverging;
+  if (name == "step") return ColorSpace::kStep;
+  throw BadInput("ColorSpace \"" + given +
+                 "\" is none of RGB, HSV, Lab, Lab/CIEDE2000, Diverging, Step");
 }
 
 OpacityCurve linearOver(const std::vector<ColorPoint>& colors) {
@@ -118,11 +183,12 @@ TransferFunction functionOf(const json& preset) {
   TransferFunction f;
   f.colors.space = spaceOf(preset);
   f.colors.points = colorPoints(preset);
-  if (preset.contains("NanColor")) {
+  if (has(preset, "NanColor")) {
     const auto c = numbers(preset, "NanColor", 3);
-    f.colors.nan = {c[0], c[1], c[2]};
+    f.colors.nan = colorOf(c[0], c[1], c[2]);
   }
-  f.opacity = preset.contains("Points") ? opacityPoints(preset) : linearOver(f.colors.points);
+  f.opacity = has(preset, "Points") && !preset["Points"].empty() ? opacityPoints(preset)
+                                                                 : linearOver(f.colors.points);
   checkTransferFunction(f);
   return f;
 }
@@ -167,7 +233,7 @@ std::string paraViewPreset(const TransferFunction& function, const std::string& 
 }
 
 TransferFunction readParaViewPreset(const std::filesystem::path& path, const std::string& name) {
-  const json presets = parsed(contentOf(path), path.string());
+  const json presets = parsed(readText(path), path.string());
   return namedFunction(chosen(presets, name, path.string()), path.string());
 }
 

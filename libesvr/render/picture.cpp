@@ -56,16 +56,15 @@ void refuseShading(const RenderOptions& options) {
     throw UsageError("sums of ellipsoids and NanoVDB grids cannot be shaded; draw voxels");
 }
 
-MarchScene marchScene(const RenderOptions& o, const SampleRule& rule) {
-  const View view(o.camera, o.resolution);
+MarchScene marchScene(const RenderOptions& o, const View& view, const SampleRule& rule) {
   MarchScene scene{view, {}, o.step, clipOf(o), rule};
   scene.isShaded = o.shading.has_value();
   if (o.shading) scene.light = lightRule(*o.shading, view, o.transfer);
   return scene;
 }
 
-Picture::Picture(const RenderOptions& options, std::size_t grids)
-    : view(checked(options, grids).camera, options.resolution),
+Picture::Picture(const RenderOptions& options, const PlaceBox& box, std::size_t grids)
+    : view(viewOf(checked(options, grids), box)),
       table(options.transfer, samplingOf(options)),
       image_{options.resolution.width, options.resolution.height, {}} {
   image_.rgba.resize(std::size_t(4) * std::size_t(image_.width) * std::size_t(image_.height));

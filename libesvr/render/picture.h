@@ -14,12 +14,19 @@ void checkRenderOptions(const RenderOptions& options, std::size_t grids = 1);
 void refuseShading(const RenderOptions& options);
 
 /// What all rays of a picture share, in the index space of level 0 and without a box.
-[[nodiscard]] MarchScene marchScene(const RenderOptions& options, const SampleRule& rule);
+[[nodiscard]] MarchScene marchScene(const RenderOptions& options, const View& view,
+                                    const SampleRule& rule);
+
+/// The view of a volume. \param box  of its cells, in index space; low > high: there are none
+[[nodiscard]] inline View viewOf(const RenderOptions& o, const PlaceBox& box) {
+  return {o.camera, o.resolution, box, o.step};
+}
 
 class Picture {
  public:
+  /// \param box  as for viewOf()
   /// \throws UsageError  as for renderField
-  explicit Picture(const RenderOptions& options, std::size_t grids = 1);
+  Picture(const RenderOptions& options, const PlaceBox& box, std::size_t grids = 1);
 
   const View view;
   const TransferTable table;

@@ -2,6 +2,7 @@
 /// The part of a ray that lies in a box. The code is compiled for host and device.
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "esvr/render.h"
@@ -34,6 +35,10 @@ ESVR_HD inline RayInterval within(const Ray& ray, const PlaceBox& box) {
   return t;
 }
 
+/// The largest number of samples that a ray may have in a volume. checkRayLength() (scene_depth.h)
+/// refuses longer ones, and no march visits more samples, whatever rounding makes of a ray's ends.
+inline constexpr std::int64_t kMostRaySamples = std::int64_t{1} << 24;
+
 /// A range of a ray's samples. Sample n lies n steps from the eye.
 struct SampleRange {
   double first, last;
@@ -43,6 +48,12 @@ struct SampleRange {
   [[nodiscard]] ESVR_HD bool has(double number) const { return number >= first && number <= last; }
   [[nodiscard]] ESVR_HD SampleRange both(const SampleRange& other) const {
     return {other.first > first ? other.first : first, other.last < last ? other.last : last};
+  }
+  /// The number of samples from the first one to a later one, at most kMostRaySamples.
+  [[nodiscard]] ESVR_HD int countTo(double number) const {
+    const double count = number - first;
+    if (!(count > 0.0)) return 0;
+    return count < double(kMostRaySamples) ? int(count) : int(kMostRaySamples);
   }
 };
 

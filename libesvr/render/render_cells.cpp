@@ -9,7 +9,7 @@ namespace esvr {
 namespace {
 
 /// A box that contains all cells, in index space.
-PlaceBox boxOf(const BrickTable& table) {
+PlaceBox cellBoxOf(const BrickTable& table) {
   const PlaceBox cells = cellsOf(table);
   const Vec3 origin = pointOf(table.origin);
   return {sum(cells.low, origin), sum(cells.high, origin)};
@@ -17,7 +17,9 @@ PlaceBox boxOf(const BrickTable& table) {
 
 LevelScene sceneOf(LazyCells& cells, const RenderOptions& o, const Picture& picture) {
   const SampleRule rule = sampleRule(o, picture.table.view(), cells.background());
-  LevelScene scene{marchScene(o, rule), levelBounds(o, picture.view, boxOf(cells.table(0))), {}};
+  LevelScene scene{marchScene(o, picture.view, rule),
+                   levelBounds(o, picture.view, cellBoxOf(cells.table(0))),
+                   {}};
   cells.prepare(scene.bounds.last);
   return scene;
 }
@@ -77,7 +79,7 @@ class CellPicture {
 }  // namespace
 
 Image renderCells(LazyCells& cells, const RenderOptions& options) {
-  Picture picture(options);
+  Picture picture(options, cellBoxOf(cells.table(0)));
   if (cells.table(0).bricks.empty()) return picture.take();
   const CellPicture colorOf(cells, options, picture);
   drawTiles(options, colorOf.tiles(), picture, colorOf);

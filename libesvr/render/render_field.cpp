@@ -1,5 +1,5 @@
-#include <tbb/parallel_for.h>
 
+#include "core/parallel.h"
 #include "esvr/render.h"
 #include "render/picture.h"
 #include "render/render_cells.h"
@@ -29,8 +29,9 @@ Lists ellipsoidsOfTiles(const VisibleEllipsoids& ellipsoids, int firstRow, int t
 void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
   const int tiles = tilesAlong(scene.options.resolution.width);
   const Lists lists = ellipsoidsOfTiles(scene.ellipsoids, firstRow, tiles);
-  tbb::parallel_for(0, tiles, [&](int t) {
+  parallelFor(0, tiles, [&](int t) {
     if (lists[t].empty()) return;
+    checkCancelled(scene.options);
     SumTile tile(scene, {t * kTileSide, firstRow});
     tile.draw(lists[t]);
     tile.copyTo(picture);
@@ -38,10 +39,10 @@ void drawRow(const TileScene& scene, int firstRow, Picture& picture) {
 }
 
 Image renderSum(const Field& field, const RenderOptions& options, const RevoxeliseOptions& voxels) {
-  Picture picture(options);
+  const auto box = supportBox(field);
+  Picture picture(options, box.value_or(kNoPlaces));
   refuseShading(options);
-  if (const auto box = supportBox(field))
-    checkRayLength(binsWithin(*box, picture.view, options.step));
+  if (box) checkRayLength(binsWithin(*box, picture.view, options.step));
   const auto ellipsoids = visibleEllipsoids(field, picture.view, options.resolution);
   const auto origins = chunkOrigins(field);
   const TileScene scene{options,
@@ -50,7 +51,7 @@ Image renderSum(const Field& field, const RenderOptions& options, const Revoxeli
                         origins,
                         sampleRule(options, picture.table.view(), field.background),
                         makeVoxelRule(field.background, voxels)};
-  tbb::parallel_for(0, tilesAlong(options.resolution.height), [&](int row) {
+  parallelFor(0, tilesAlong(options.resolution.height), [&](int row) {
     checkCancelled(options);
     drawRow(scene, row * kTileSide, picture);
   });

@@ -88,7 +88,7 @@ GridCells::GridCells(const DrawnGrid& grid) {
 
 Image renderGrids(const std::vector<GridCells>& grids, const RenderOptions& options) {
   checkGridsOptions(options, grids.size());
-  Picture picture(options, grids.size());
+  Picture picture(options, kNoPlaces, grids.size());  // the scene has the view
   if (std::ranges::all_of(grids, [](const GridCells& g) { return g.table().bricks.empty(); }))
     return picture.take();
   kDrawGrids[grids.size() - 1](GridsPicture(grids, options, picture.table), options, picture);

@@ -1,12 +1,12 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <stdexcept>
 
+#include "core/parallel.h"
 #include "esvr/renderer.h"
 #include "render/nano_box.h"
 #include "render/nano_march.h"
 #include "render/picture.h"
+#include "render/scene_depth.h"
 
 namespace esvr {
 namespace {
@@ -16,12 +16,12 @@ void drawAs(const NanoVolume& volume, const RenderOptions& o, Picture& picture) 
   const auto& grid = *reinterpret_cast<const nanovdb::NanoGrid<Build>*>(volume.data.get());
   const MarchScene scene{picture.view, sampledBox(volume), o.step, clipOf(o),
                          sampleRule(o, picture.table.view(), volume.background)};
-  tbb::parallel_for(tbb::blocked_range<int>(0, o.resolution.height), [&](const auto& rows) {
-    for (int row = rows.begin(); row != rows.end(); ++row) {
-      checkCancelled(o);
-      for (int column = 0; column < o.resolution.width; ++column)
+  parallelFor(tbb::blocked_range<int>(0, o.resolution.height), [&](const auto& rows) {
+    for (int row = rows.begin(); row != rows.end(); ++row)
+      for (int column = 0; column < o.resolution.width; ++column) {
+        checkCancelled(o);  // a single ray may take a tenth of a second
         picture.set(column, row, marchNano(grid, scene, column, row));
-    }
+      }
   });
 }
 
@@ -44,8 +44,11 @@ void drawInto(Picture& picture, const NanoVolume& volume, const RenderOptions& o
 }  // namespace
 
 Image renderNano(const NanoVolume& volume, const RenderOptions& options) {
-  Picture picture(options);
+  const PlaceBox box = sampledBox(volume);
+  Picture picture(options, box);
   refuseShading(options);
+  if (box.low[0] > box.high[0]) return picture.take();
+  checkRayLength(binsWithin(box, picture.view, options.step));
   drawInto(picture, volume, options);
   return picture.take();
 }

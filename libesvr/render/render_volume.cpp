@@ -1,10 +1,9 @@
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/parallel.h"
 #include "render/level_tables.h"
 #include "render/render_levels.h"
 #include "render/scene_depth.h"
@@ -13,14 +12,14 @@
 namespace esvr {
 namespace {
 
-/// The first sample behind an empty brick. Because of rounding, a sample on the far face of the
-/// brick may be visited twice, but it is never skipped.
-double behindBrick(const Ray& ray, Coord brick, double sample, double step) {
+/// The number of the first sample behind an empty brick. Because of rounding, a sample on the far face
+/// of the brick may be visited twice, but it is never skipped.
+double behindBrick(const Ray& ray, Coord brick, double step) {
   constexpr double kRounding = 1e-6;
   const Vec3 low{double(brick.x) * kBrickSide, double(brick.y) * kBrickSide,
                  double(brick.z) * kBrickSide};
   const Vec3 high = sum(low, {kBrickSide, kBrickSide, kBrickSide});
-  return std::max(sample + 1.0, std::ceil(within(ray, {low, high}).end / step - kRounding));
+  return std::ceil(within(ray, {low, high}).end / step - kRounding);
 }
 
 /// A ray, and the shade at its last sample.
@@ -43,25 +42,30 @@ class RayMarch {
   /// Adds the samples of a range to a ray.
   void march(const Ray& ray, const SampleRange& wanted, LitRay& state) const {
     const SampleRange range = samplesInScene(scene_, ray).both(wanted);
-    for (double sample = range.first; range.has(sample) && scene_.rule.open(state.ray);)
-      sample = advance(ray, sample, state);
+    if (!(range.first <= range.last)) return;
+    // Counted by integers, which grow however large the number of a sample is.
+    const int end = range.countTo(range.last) + 1;
+    for (int i = 0; i < end && scene_.rule.open(state.ray);) i = advance(ray, range, i, state);
   }
 
  private:
-  /// Adds a sample to the ray. \return the number of the next sample to visit
-  double advance(const Ray& ray, double sample, LitRay& state) const {
+  /// Adds sample i of a range to the ray. \return the next sample to visit
+  int advance(const Ray& ray, const SampleRange& range, int i, LitRay& state) const {
+    const double sample = range.first + i;
     const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * scene_.step));
     const Cell cell = cellOf(place);
     const auto brick = brickOf(cell.voxel);
     const VoxelSampler::Corners* corners = sampler_.find(brick);
-    if (corners == nullptr) return behindBrick(ray, brick, sample, scene_.step);
+    if (corners == nullptr)
+      return std::max(i + 1, range.countTo(behindBrick(ray, brick, scene_.step)));
     const float value = sampler_.interpolate(*corners, cell);
     if (value != scene_.rule.background) {
       const Shade shade = scene_.isShaded ? shadeAt(ray, place, *corners, brick) : Shade{};
-      scene_.rule.add(state.ray, value, sampleNumber(sample), Shades{state.shade, shade});
+      scene_.rule.add(state.ray, value, sampleNumber(sample, scene_.view.before / scene_.step),
+                      Shades{state.shade, shade});
       state.shade = shade;
     }
-    return sample + 1.0;
+    return i + 1;
   }
   [[nodiscard]] Shade shadeAt(const Ray& ray, const Vec3& place,
                               const VoxelSampler::Corners& corners, Coord brick) const {
@@ -72,7 +76,7 @@ class RayMarch {
     };
     const FloatPlace gradient =
         gradientAt(floatPlace(difference(place, low)), float(kBrickSide), valueAt);
-    return scene_.light.shadeOf(gradient, floatPlace(ray.direction));
+    return scene_.light.shadeOf(gradient, floatPlace(scene_.view.inCameraSpace(ray.direction)));
   }
   /// The cell of a place relative to a brick, also on the brick's upper faces.
   static Cell cellIn(Coord corner, const FloatPlace& p) {
@@ -90,6 +94,7 @@ class RayMarch {
 PlaceBox boxOf(const SparseVolume& volume) {
   Box box;
   for (const Coord brick : volume.bricks) box.expand(brick);
+  if (box.empty()) return kNoPlaces;
   const Coord low = volume.origin + box.min * kBrickSide;
   const Coord high = volume.origin + (box.max + Coord{1, 1, 1}) * kBrickSide;
   return {{double(low.x) - 1.0, double(low.y) - 1.0, double(low.z) - 1.0},
@@ -101,12 +106,13 @@ class VolumePicture {
   VolumePicture(VolumeLevels& levels, const RenderOptions& options, const Picture& picture)
       : bounds_(levelBounds(options, picture.view, boxOf(levels[0]))),
         tables_(picture, options, bounds_) {
+    checkRayLength(binsWithin(boxOf(levels[0]), picture.view, options.step));
     levels.prepare(bounds_.last);
     const float background = levels[0].background;
     for (int level = bounds_.first; level <= bounds_.last; ++level)
       marches_.emplace_back(
           levels[level], LevelFrame{level},
-          marchScene(options, sampleRule(options, tables_.view(level), background)));
+          marchScene(options, picture.view, sampleRule(options, tables_.view(level), background)));
   }
 
   [[nodiscard]] PixelColor operator()(int column, int row) const {
@@ -144,15 +150,15 @@ class VolumePicture {
 }  // namespace
 
 Image renderLevels(VolumeLevels& levels, const RenderOptions& options) {
-  Picture picture(options);
+  Picture picture(options, boxOf(levels[0]));
   if (levels[0].bricks.empty()) return picture.take();
   const VolumePicture pixel(levels, options, picture);
-  tbb::parallel_for(tbb::blocked_range<int>(0, options.resolution.height), [&](const auto& rows) {
-    for (int row = rows.begin(); row != rows.end(); ++row) {
-      checkCancelled(options);
-      for (int column = 0; column < options.resolution.width; ++column)
+  parallelFor(tbb::blocked_range<int>(0, options.resolution.height), [&](const auto& rows) {
+    for (int row = rows.begin(); row != rows.end(); ++row)
+      for (int column = 0; column < options.resolution.width; ++column) {
+        checkCancelled(options);  // a single ray may take a tenth of a second
         picture.set(column, row, pixel(column, row));
-    }
+      }
   });
   return picture.take();
 }

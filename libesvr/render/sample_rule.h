@@ -17,8 +17,11 @@ struct SampleNumber {
   /// two samples are consecutive however far away the eye is.
   std::uint32_t index;
 };
-[[nodiscard]] inline SampleNumber sampleNumber(double fromEye) {
-  return {float(fromEye), std::uint32_t(std::int64_t(fromEye))};
+/// \param number  of the sample, counted from where rays begin
+/// \param before  samples between the eye and that place
+[[nodiscard]] inline SampleNumber sampleNumber(double number, double before = 0.0) {
+  constexpr double kMost = 0x1p62;  // float64 does not tell neighbours apart there
+  return {float(number + before), std::uint32_t(std::int64_t(number < kMost ? number : kMost))};
 }
 
 /// The state of a ray, or of a part of it, while its samples are added. The meaning of r, g and b

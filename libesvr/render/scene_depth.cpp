@@ -38,7 +38,22 @@ double distanceTo(const PlaceBox& box, const Vec3& eye) {
   return length(away);
 }
 
+/// The distances for voxels that are no cubes. The nearest one is that of the sphere around the box.
+Distances fromEyeByCoordinates(const PlaceBox& box, const View& view) {
+  const Vec3 middle = scaled(sum(box.low, box.high), 0.5);
+  double radius = 0.0;
+  Distances d{0.0, 0.0};
+  for (int c = 0; c < kCellCorners; ++c) {
+    const Vec3 at = corner(box, c);
+    radius = std::max(radius, length(view.coordinates(difference(at, middle))));
+    d.farthest = std::max(d.farthest, length(view.coordinates(difference(at, view.eye))));
+  }
+  d.nearest = std::max(0.0, length(view.coordinates(difference(middle, view.eye))) - radius);
+  return d;
+}
+
 Distances fromEye(const PlaceBox& box, const View& view) {
+  if (!view.isCube) return fromEyeByCoordinates(box, view);
   Distances d{distanceTo(box, view.eye), 0.0};
   for (int c = 0; c < kCellCorners; ++c)
     d.farthest = std::max(d.farthest, length(difference(corner(box, c), view.eye)));
@@ -48,7 +63,7 @@ Distances fromEye(const PlaceBox& box, const View& view) {
 Distances alongForward(const PlaceBox& box, const View& view) {
   Distances d{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (int c = 0; c < kCellCorners; ++c) {
-    const double depth = inner(view.forward, difference(corner(box, c), view.eye));
+    const double depth = inner(view.ofForward, difference(corner(box, c), view.eye));
     d.nearest = std::min(d.nearest, depth), d.farthest = std::max(d.farthest, depth);
   }
   return d;
@@ -79,10 +94,10 @@ BinRange binsWithin(const PlaceBox& box, const View& view, double step) {
 }
 
 void checkRayLength(const BinRange& bins) {
-  constexpr std::int64_t kMaxBins = (std::int64_t{1} << 24) / kBinSamples;
+  constexpr std::int64_t kMaxBins = kMostRaySamples / kBinSamples;
   const std::int64_t count = bins.last - bins.first + 1;
   if (count > kMaxBins)
-    throw UsageError("rays of " + std::to_string(count * kBinSamples) +
+    throw UsageError("rays of " + std::to_string(count) + " x " + std::to_string(kBinSamples) +
                      " samples are too long; take a longer step");
 }
 

@@ -15,7 +15,7 @@ namespace esvr {
 /// The bins whose samples may lie in a box; empty if last < first.
 [[nodiscard]] BinRange binsWithin(const PlaceBox& box, const View& view, double step);
 
-/// \throws UsageError  a ray has more than 2^24 samples in these bins
+/// \throws UsageError  a ray has more than kMostRaySamples samples in these bins
 void checkRayLength(const BinRange& bins);
 
 }  // namespace esvr

@@ -29,8 +29,11 @@ ESVR_HD inline Matrix3 unitRotation(const PackedEllipsoid& e) {
 /// An ellipsoid in the coordinates of the view: right, up, forward.
 struct SeenEllipsoid {
   Vec3 center;
-  std::array<Vec3, 3> axes;  ///< unit vectors
+  std::array<Vec3, 3> axes;  ///< of unit length in index space
   Vec3 scale;                ///< the scales along the axes
+  /// The components of the steps View::right, up and forward along the axes: member a has those along
+  /// axis a. If voxels are cubes, these are the coordinates of the axes.
+  std::array<Vec3, 3> steps;
 };
 
 /// An ellipsoid in the form that rays use (ray_math.h).
@@ -119,6 +122,11 @@ ESVR_HD inline std::int32_t lastPixel(double high, int count) {
 
 }  // namespace ellipsoid_math
 
+/// The components of the view's steps along a direction of the index space.
+ESVR_HD inline Vec3 stepsAlong(const View& view, const Vec3& axis) {
+  return {inner(view.right, axis), inner(view.up, axis), inner(view.forward, axis)};
+}
+
 /// \param fromEye  displacement from the eye to the origin of the ellipsoid's chunk
 ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
                                     const Vec3& fromEye) {
@@ -127,7 +135,9 @@ ESVR_HD inline SeenEllipsoid seenBy(const View& view, const PackedEllipsoid& e,
   return {view.coordinates(sum(fromEye, center)),
           {view.coordinates(columnOf(R, 0)), view.coordinates(columnOf(R, 1)),
            view.coordinates(columnOf(R, 2))},
-          {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])}};
+          {double(e.scale[0]), double(e.scale[1]), double(e.scale[2])},
+          {stepsAlong(view, columnOf(R, 0)), stepsAlong(view, columnOf(R, 1)),
+           stepsAlong(view, columnOf(R, 2))}};
 }
 
 /// \param radius  radius of the support in units of the scales
@@ -203,8 +213,8 @@ ESVR_HD inline EllipsoidView viewOf(const View& view, const SeenEllipsoid& e, bo
                                     float intensity, const RayKernel& kernel) {
   using namespace ellipsoid_math;
   const Vec3 inverse{1.0 / e.scale[0], 1.0 / e.scale[1], 1.0 / e.scale[2]};
-  const Vec3 right = row(e.axes, inverse, 0), up = row(e.axes, inverse, 1),
-             forward = row(e.axes, inverse, 2), none{0.0, 0.0, 0.0};
+  const Vec3 right = row(e.steps, inverse, 0), up = row(e.steps, inverse, 1),
+             forward = row(e.steps, inverse, 2), none{0.0, 0.0, 0.0};
   const Vec3 eye = scaled(
       sum(sum(scaled(right, e.center[0]), scaled(up, e.center[1])), scaled(forward, e.center[2])),
       -1.0);

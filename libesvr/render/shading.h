@@ -35,11 +35,19 @@ struct LightRule {
   FloatPlace toLight;  ///< of unit length
   float ambient, diffuse, specular, shininess;
   float weakSquared;  ///< square of a gradient that has half of its effect
+  /// Whether voxels are no cubes. The rows of `toCamera` then convert gradients from the index space to
+  /// the camera's space.
+  bool converts = false;
+  FloatPlace toCamera[3] = {};
 
-  /// \param gradient   of the values; a place without one is lit from the front
-  /// \param direction  of the ray, of unit length
-  [[nodiscard]] ESVR_HD Shade shadeOf(const FloatPlace& gradient,
+  /// \param inIndex    gradient of the values in index space; a place without one is lit from the front
+  /// \param direction  of the ray in the camera's space, of unit length
+  [[nodiscard]] ESVR_HD Shade shadeOf(const FloatPlace& inIndex,
                                       const FloatPlace& direction) const {
+    const FloatPlace gradient =
+        converts ? FloatPlace{inner(toCamera[0], inIndex), inner(toCamera[1], inIndex),
+                              inner(toCamera[2], inIndex)}
+                 : inIndex;
     const float squared = inner(gradient, gradient);
     if (!(squared > 0.0f)) return {ambient + diffuse, 0.0f};
     const float perLength = 1.0f / std::sqrt(squared);

@@ -45,7 +45,8 @@ void Tile::draw(std::span<const std::uint32_t> ellipsoids) {
 
 void Tile::add(int pixel, float value, double number) {
   if (alive(pixel) && clips_[pixel].has(number))
-    scene_.rule.add(rays_[pixel], value, sampleNumber(number));
+    scene_.rule.add(rays_[pixel], value,
+                    sampleNumber(number, scene_.view.before / scene_.options.step));
 }
 
 bool Tile::anyAlive() const {

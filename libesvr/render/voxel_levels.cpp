@@ -1,11 +1,10 @@
 #include "render/voxel_levels.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "core/brick_index.h"
 #include "core/cell_corner.h"
+#include "core/parallel.h"
 #include "render/cell_bricks.h"
 #include "render/level_of_detail.h"
 
@@ -58,7 +57,7 @@ SparseVolume coarserVolume(const SparseVolume& volume) {
   coarser.origin = low * kBrickSide;
   coarser.values.resize(coarser.bricks.size() * kBrickVoxels);
   coarser.active.resize(coarser.bricks.size());
-  tbb::parallel_for(std::size_t(0), coarser.bricks.size(), [&](std::size_t i) {
+  parallelFor(std::size_t(0), coarser.bricks.size(), [&](std::size_t i) {
     fillCoarser(volume, index, coarser.bricks[i],
                 std::span<float, kBrickVoxels>(coarser.brickValues(i)));
     coarser.bricks[i] = coarser.bricks[i] - low;

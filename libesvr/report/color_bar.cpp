@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <cstring>
 
+#include "esvr/grid_names.h"
 #include "report/axis.h"
 #include "report/cairo_surface.h"
-#include "report/utf8.h"
 
 namespace esvr::report {
 namespace {
@@ -82,7 +82,7 @@ void dropLast(std::string& text) {
 std::string shortened(const std::string& given, double most, cairo_font_weight_t weight,
                       const Lettering& letters) {
   constexpr std::size_t kMostBytes = 200;  // bounds the work for a damaged name
-  std::string text = validUtf8(given.substr(0, kMostBytes));
+  std::string text = shownText(given.substr(0, kMostBytes), LineEnds::kKeep);
   std::replace(text.begin(), text.end(), '\n', ' ');
   if (letters.width(text, weight) <= most) return text;
   while (!text.empty() && letters.width(text + "\u2026", weight) > most) dropLast(text);

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "cli/table.h"
+#include "esvr/grid_names.h"
 
 namespace esvr::report {
 namespace {
@@ -35,20 +36,12 @@ std::string numberText(Kind kind, double value) {
   }
 }
 
-std::string csvField(const std::string& text) {
+std::string csvField(const std::string& given) {
+  const std::string text = shownText(given, LineEnds::kKeep);
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
   return quoted + '"';
-}
-
-std::string markdownField(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    if (c == '|') escaped += '\\';
-    escaped += c == '\n' ? ' ' : c;
-  }
-  return escaped;
 }
 
 template <class FieldOf>
@@ -93,6 +86,24 @@ DataTable withColumns(const DataTable& table, const std::vector<std::string>& ke
   return result;
 }
 
+std::string markdownText(const std::string& text) {
+  constexpr std::string_view kMarkup = "\\`*_[]<>|~&$#";
+  std::string escaped;
+  for (const char c : shownText(text, LineEnds::kKeep)) {
+    if (kMarkup.find(c) != std::string_view::npos) escaped += '\\';
+    escaped += c == '\n' ? ' ' : c;
+  }
+  return escaped;
+}
+
+std::string markdownCode(const std::string& text) {
+  const std::string shown = shownText(text, LineEnds::kReplace);
+  std::size_t longest = 0, run = 0;
+  for (const char c : shown) longest = std::max(longest, run = c == '`' ? run + 1 : 0);
+  const std::string fence(longest + 1, '`');
+  return longest == 0 ? fence + shown + fence : fence + ' ' + shown + ' ' + fence;
+}
+
 std::string toCsv(const DataTable& table) {
   const std::size_t n = table.columns.size();
   const auto csvLine = [&](const auto& fieldOf) { return line(n, "", ",", "", fieldOf); };
@@ -104,14 +115,14 @@ std::string toCsv(const DataTable& table) {
 
 std::string toMarkdown(const DataTable& table) {
   const std::size_t n = table.columns.size();
-  std::string text = table.title.empty() ? "" : "## " + table.title + "\n\n";
-  text += markdownLine(n, [&](std::size_t i) { return markdownField(table.columns[i].header); });
+  std::string text = table.title.empty() ? "" : "## " + markdownText(table.title) + "\n\n";
+  text += markdownLine(n, [&](std::size_t i) { return markdownText(table.columns[i].header); });
   text += line(n, "|", "|", "|", [&](std::size_t i) {
     return std::string(table.columns[i].kind == Kind::kText ? "---" : "--:");
   });
   for (const auto& row : table.rows)
     text += markdownLine(
-        n, [&](std::size_t i) { return markdownField(cellText(table.columns[i], row[i])); });
+        n, [&](std::size_t i) { return markdownText(cellText(table.columns[i], row[i])); });
   return text;
 }
 

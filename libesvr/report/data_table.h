@@ -56,7 +56,13 @@ struct DataTable {
 /// The table as comma-separated values (RFC 4180): a line of keys, then the rows.
 [[nodiscard]] std::string toCsv(const DataTable& table);
 
-/// The table in GitHub's Markdown, under a heading.
+/// Text of unknown origin in one line of GitHub's Markdown, in which it has no markup.
+[[nodiscard]] std::string markdownText(const std::string& text);
+
+/// Text of unknown origin as a code span of Markdown.
+[[nodiscard]] std::string markdownCode(const std::string& text);
+
+/// The table in GitHub's Markdown, under a heading. Cells and headings are markdownText().
 [[nodiscard]] std::string toMarkdown(const DataTable& table);
 
 }  // namespace esvr::report

@@ -1,6 +1,6 @@
 #include "report/escape.h"
 
-#include "report/utf8.h"
+#include "esvr/grid_names.h"
 
 namespace esvr::report {
 namespace {
@@ -28,7 +28,7 @@ void append(char c, std::string& to) {
 
 std::string escaped(std::string_view text) {
   std::string result;
-  for (const char c : validUtf8(text)) append(c, result);
+  for (const char c : shownText(text, LineEnds::kKeep)) append(c, result);
   return result;
 }
 

@@ -6,8 +6,8 @@
 
 namespace esvr::report {
 
-/// Replaces markup characters by entities. Bytes that are not UTF-8 and control characters other
-/// than line feeds become '?'.
+/// Replaces markup characters by entities, and what shownText() (esvr/grid_names.h) replaces but line
+/// feeds.
 [[nodiscard]] std::string escaped(std::string_view text);
 
 }  // namespace esvr::report

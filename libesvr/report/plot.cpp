@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "esvr/grid_names.h"
 #include "report/cairo_surface.h"
-#include "report/utf8.h"
 
 namespace esvr::report {
 namespace {
@@ -87,7 +87,7 @@ class Painter {
   }
 
   void text(const std::string& given, double x, double y, Anchor anchor, double size = kTextSize) {
-    const std::string shown = validUtf8(given);
+    const std::string shown = shownText(given, LineEnds::kKeep);
     const double width = widthOf(shown, size);
     const double shift = anchor == Anchor::kStart    ? 0.0
                          : anchor == Anchor::kMiddle ? width / 2
@@ -167,8 +167,9 @@ class Painter {
   /// Draws the legend beside the curves.
   void measureLegend() {
     for (const auto& series : plot_.series)
-      legendWidth_ = std::max(
-          legendWidth_, widthOf(validUtf8(series.name), kTextSize) + kLegendMark + 2 * kTickGap);
+      legendWidth_ =
+          std::max(legendWidth_, widthOf(shownText(series.name, LineEnds::kKeep), kTextSize) +
+                                     kLegendMark + 2 * kTickGap);
   }
 
   void drawLegend() {

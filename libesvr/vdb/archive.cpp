@@ -3,11 +3,12 @@
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/io.h>
 
-#include <algorithm>
-
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
+#include "vdb/errors.h"
 #include "vdb/metadata.h"
 #include "vdb/transform.h"
+#include "vdb/tree_survey.h"
 #include "vdb/versions.h"
 
 namespace esvr::vdb {
@@ -28,18 +29,25 @@ struct DirectoryRow {
   std::int64_t next = 0;
 };
 
-DirectoryRow readRow(InputFile& file) {
-  DirectoryRow row;
-  row.entry.storedName = file.readString();
+/// Reads the entry up to its positions.
+ArchiveEntry readNames(InputFile& file) {
+  ArchiveEntry entry;
+  entry.storedName = file.readString();
   const std::string type = file.readString();
-  row.entry.treeType = withoutSuffix(type, kHalfSuffix);
-  row.entry.savedAsHalf = row.entry.treeType != type;
-  row.entry.parent = file.readString();
+  entry.treeType = withoutSuffix(type, kHalfSuffix);
+  entry.savedAsHalf = entry.treeType != type;
+  entry.parent = file.readString();
+  return entry;
+}
+
+DirectoryRow readRow(InputFile& file) {
+  DirectoryRow row{readNames(file)};
   const auto gridAt = file.read<std::int64_t>();
   const auto blocksAt = file.read<std::int64_t>();
   row.next = file.read<std::int64_t>();
   if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
-    throw BadInput("is damaged: grid \"" + row.entry.name() + "\" has no valid place in the file");
+    throw BadInput("is damaged: grid \"" + shownName(row.entry.name()) +
+                   "\" has no valid place in the file");
   row.entry.gridAt = std::uint64_t(gridAt);
   row.entry.gridBytes = std::uint64_t(row.next - gridAt);
   row.entry.blocksAt = std::uint64_t(blocksAt);
@@ -53,9 +61,9 @@ std::string ArchiveEntry::name() const {
 }
 
 std::string ArchiveEntry::valueType() const {
-  if (!treeType.starts_with(kTreePrefix)) return treeType;
+  if (!treeType.starts_with(kTreePrefix)) return shownName(treeType);
   const auto begin = std::string(kTreePrefix).size();
-  return treeType.substr(begin, treeType.find('_', begin) - begin);
+  return shownName(treeType.substr(begin, treeType.find('_', begin) - begin));
 }
 
 bool beginsAsVdb(InputFile& file) {
@@ -94,22 +102,61 @@ void Archive::readHeader() {
   const auto major = file_.read<std::uint32_t>();
   const auto minor = file_.read<std::uint32_t>();
   openvdb::io::setVersion(file_.stream(), {major, minor}, vdbVersion_);
-  if (!file_.read<char>())
-    throw BadInput("was written to a stream and has no table of grids: save it to a file");
+  hasPositions_ = file_.read<char>() != 0;
   file_.skip(kUuidBytes);
 }
 
 void Archive::readDirectory() {
   const auto count = file_.read<std::int32_t>();
   if (count < 0) throw BadInput("is damaged: a negative number of grids");
+  if (!hasPositions_) return readStreamedGrids(count);
   for (std::int32_t i = 0; i < count; ++i) {
     DirectoryRow row = readRow(file_);
-    entries_.push_back(std::move(row.entry));
     file_.seek(std::uint64_t(row.next));
+    addEntry(std::move(row.entry));
   }
 }
 
+void Archive::addEntry(ArchiveEntry entry) {
+  if (entry.parent.empty()) owners_.emplace(entry.storedName, entries_.size());
+  entries_.push_back(std::move(entry));
+}
+
+void Archive::readStreamedGrids(std::int32_t count) {
+  constexpr std::uint64_t kPositions = 3 * sizeof(std::int64_t);  // which are 0
+  for (std::int32_t i = 0; i < count; ++i) {
+    ArchiveEntry entry = readNames(file_);
+    file_.skip(kPositions);
+    entry.gridAt = file_.position();
+    entry.gridBytes = file_.remaining();
+    inGrid(entry.name(), [&] { locate(entry, i + 1 == count); });
+    file_.seek(entry.gridAt + entry.gridBytes);
+    addEntry(std::move(entry));
+  }
+}
+
+/// Finds the values and the end of a grid of a stream.
+void Archive::locate(ArchiveEntry& entry, bool isLast) {
+  const GridHead head = readHead(entry);
+  entry.blocksAt = head.treeAt;
+  if (!entry.parent.empty()) {
+    entry.gridBytes = head.treeAt - entry.gridAt;
+    return;
+  }
+  const auto layout = layoutOf({entry.treeType, entry.savedAsHalf, head.compression});
+  if (!layout && isLast) return;
+  const auto extent = layout ? extentOfTree(file_, *layout) : TreeExtent{};
+  if (extent.valuesAt != 0) entry.blocksAt = extent.valuesAt;
+  if (extent.end != 0)
+    entry.gridBytes = extent.end - entry.gridAt;
+  else if (!isLast)
+    throw BadInput("the file was written to a stream, and the end of a tree of type " +
+                   entry.treeType +
+                   " cannot be found in it: save it to a file, or with this grid as the last one");
+}
+
 GridHead Archive::readHead(const ArchiveEntry& entry) {
+  const InputFile::Within grid(file_, entry.gridAt + entry.gridBytes);
   file_.seek(entry.gridAt);
   GridHead head;
   head.compression = file_.read<std::uint32_t>();
@@ -121,12 +168,9 @@ GridHead Archive::readHead(const ArchiveEntry& entry) {
 
 const ArchiveEntry& Archive::treeOwner(const ArchiveEntry& entry) const {
   if (entry.parent.empty()) return entry;
-  const auto parent =
-      std::find_if(entries_.begin(), entries_.end(), [&](const ArchiveEntry& candidate) {
-        return candidate.storedName == entry.parent && candidate.parent.empty();
-      });
-  if (parent == entries_.end()) throw BadInput("shares the voxels of a grid that is not there");
-  return *parent;
+  const auto parent = owners_.find(entry.parent);
+  if (parent == owners_.end()) throw BadInput("shares the voxels of a grid that is not there");
+  return entries_[parent->second];
 }
 
 }  // namespace esvr::vdb

@@ -3,8 +3,13 @@
 /// OpenVDB reads the voxels from this stream (tree_reader.h). The directory is read here, because
 /// OpenVDB does not check sizes, cannot skip a grid of unknown type and does not keep the order of
 /// grids.
+///
+/// A file that was written to a stream, for example to a pipe, has no positions of grids. They are
+/// found by a walk over all trees (tree_survey.h), which reads no voxels. The end of a grid with a
+/// tree that cannot be walked over is known only if it is the last one, which ends with the file.
 
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "esvr/carried_grid.h"
@@ -23,8 +28,9 @@ struct ArchiveEntry {
   std::uint64_t gridBytes = 0;
   std::uint64_t blocksAt = 0;  ///< position of the values, as the file says; it is not checked
 
-  [[nodiscard]] std::string name() const;       ///< the name without the number
-  [[nodiscard]] std::string valueType() const;  ///< "float", "vec3s", "ptdataidx32", ...
+  [[nodiscard]] std::string name() const;  ///< the name without the number
+  /// "float", "vec3s", "ptdataidx32", ...; a text that can be shown (shownName)
+  [[nodiscard]] std::string valueType() const;
 };
 
 /// The part of a grid before its tree.
@@ -37,7 +43,8 @@ struct GridHead {
 
 class Archive {
  public:
-  /// \throws BadInput  the file is not a .vdb, is too old, or is damaged
+  /// \throws BadInput  the file is not a .vdb, is too old, or is damaged; it was written to a stream
+  ///                   and has a tree before its last grid that cannot be walked over
   explicit Archive(InputFile& file);
   /// The archive of one grid that is carried.
   /// \param file  the grid's bytes
@@ -47,6 +54,7 @@ class Archive {
   [[nodiscard]] std::uint32_t vdbVersion() const { return vdbVersion_; }
   [[nodiscard]] const std::vector<MetaItem>& metadata() const { return metadata_; }
   [[nodiscard]] const std::vector<ArchiveEntry>& entries() const { return entries_; }
+  /// \throws BadInput  the head is damaged or ends behind its grid
   GridHead readHead(const ArchiveEntry& entry);
   /// The entry that holds an entry's tree, which is the entry itself unless it has a parent.
   /// \throws BadInput  there is no such entry
@@ -55,11 +63,17 @@ class Archive {
  private:
   void readHeader();
   void readDirectory();
+  void addEntry(ArchiveEntry entry);
+  void readStreamedGrids(std::int32_t count);
+  void locate(ArchiveEntry& entry, bool isLast);
 
   InputFile& file_;
   std::uint32_t vdbVersion_ = 0;
+  bool hasPositions_ = true;  ///< false: the file was written to a stream
   std::vector<MetaItem> metadata_;
   std::vector<ArchiveEntry> entries_;
+  std::unordered_map<std::string, std::size_t>
+      owners_;  ///< entries with a tree of their own, by their stored names
 };
 
 /// True if the file begins as a .vdb file does.

@@ -4,9 +4,8 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/io.h>
 
-#include <algorithm>
-
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/carry.h"
 
 namespace esvr::vdb {
@@ -39,6 +38,7 @@ ArchiveWriter::ArchiveWriter(std::ostream& stream, std::uint32_t compression,
   openvdb::io::setDataCompression(stream_, compression);
   writeHeader(stream_, kSeekable);
   metadata.writeMeta(stream_);
+  for (const std::string& name : names_) ++counts_[name];
   const auto count = std::int32_t(names_.size());
   stream_.write(reinterpret_cast<const char*>(&count), sizeof count);
 }
@@ -65,7 +65,7 @@ void ArchiveWriter::add(const openvdb::GridBase::ConstPtr& grid) {
 
 void ArchiveWriter::add(const CarriedGrid& grid) {
   if (const auto why = whyNotCarried(grid.treeType, grid.vdbVersion); !why.empty())
-    throw RuntimeFailure("grid \"" + grid.name + "\" cannot be written: " + why);
+    throw RuntimeFailure("grid \"" + shownName(grid.name) + "\" cannot be written: " + why);
   openvdb::io::GridDescriptor row(nextName(), grid.treeType, grid.savedAsHalf);
   row.writeHeader(stream_);
   constexpr std::int64_t kPositionBytes = 3 * sizeof(std::int64_t);
@@ -81,10 +81,14 @@ void ArchiveWriter::add(const CarriedGrid& grid) {
 std::string ArchiveWriter::nextName() {
   using openvdb::io::GridDescriptor;
   const std::string& name = names_.at(next_++);
-  const bool isShared = std::count(names_.begin(), names_.end(), name) > 1;
-  std::string unique = name.empty() || isShared ? GridDescriptor::addSuffix(name, 0) : name;
-  for (int n = 1; !taken_.insert(unique).second; ++n) unique = GridDescriptor::addSuffix(name, n);
-  return unique;
+  const bool isAlone = !name.empty() && counts_.at(name) == 1;
+  if (isAlone && taken_.insert(name).second) return name;
+  for (int& number = numbers_[name];;) {
+    std::string unique = GridDescriptor::addSuffix(name, number++);
+    // OpenVDB also finds this grid by "NAME[number]", which another grid may be called.
+    if (counts_.contains(GridDescriptor::nameAsString(unique))) continue;
+    if (taken_.insert(unique).second) return unique;
+  }
 }
 
 }  // namespace esvr::vdb

@@ -7,9 +7,10 @@
 #include <openvdb/io/Archive.h>
 
 #include <ostream>
-#include <set>
 #include <span>
 #include <string>
+#include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "esvr/carried_grid.h"
@@ -43,7 +44,9 @@ class ArchiveWriter : private openvdb::io::Archive {
   std::ostream& stream_;
   openvdb::io::StreamMetadata::Ptr state_;  ///< the stream points to this member
   std::vector<std::string> names_;
-  std::set<std::string> taken_;  ///< names of the directory so far
+  std::unordered_map<std::string, int> counts_;   ///< of grids by their names
+  std::unordered_map<std::string, int> numbers_;  ///< the next numbers of grids that share a name
+  std::unordered_set<std::string> taken_;         ///< names of the directory so far
   std::size_t next_ = 0;
 };
 

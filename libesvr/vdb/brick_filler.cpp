@@ -1,25 +1,29 @@
 #include "vdb/brick_filler.h"
 
 #include <limits>
+#include <optional>
 #include <string>
 
+#include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/memory_limit.h"
 
 namespace esvr::vdb {
 namespace {
 
-/// Bytes of a brick's voxels, and of its mask and its coordinates in the volume and in two lists.
+/// Bytes of a brick's values, of its mask and place in each volume, and of its place in lists while
+/// the tree is read.
 constexpr double kValueBytes = kBrickVoxels * sizeof(float);
-constexpr double kEntryBytes = sizeof(BrickMask) + 3.0 * sizeof(Coord);
+constexpr double kEntryBytes = sizeof(BrickMask) + sizeof(Coord);
+constexpr double kListBytes = 2.0 * sizeof(Coord);
 
 void refuseTooFarApart(Coord low, Coord high) {
   constexpr std::int64_t kMaxExtent = std::numeric_limits<std::int32_t>::max() - kBrickSide;
   const std::int64_t extent = std::max(
       {std::int64_t(high.x) - low.x, std::int64_t(high.y) - low.y, std::int64_t(high.z) - low.z});
   if (extent > kMaxExtent)
-    throw BadInput("its active voxels reach from " + toString(low) + " to " + toString(high) +
-                   ": 2^31 voxels or more");
+    throw CannotConvert("its active voxels reach from " + toString(low) + " to " + toString(high) +
+                        ": 2^31 voxels or more");
 }
 
 void refuseEmpty(std::size_t bricks, const FillRules& rules) {
@@ -28,25 +32,64 @@ void refuseEmpty(std::size_t bricks, const FillRules& rules) {
 
 }  // namespace
 
+void InactiveCounter::tile(const TileSource& tile) {
+  if (tile.value == background_) return;
+  const std::int32_t last = tile.extent - 1;
+  InactiveValues values;
+  values.add(tile.value, Box{tile.corner, tile.corner + Coord{last, last, last}});
+  if (isNegated(tile.value))
+    negatedPlaces_.push_back({tile.corner, values});
+  else
+    others_.add(values);
+}
+
+void InactiveCounter::leaf(std::span<const double, kBrickVoxels> values, Coord corner) {
+  InactiveValues negated;
+  for (int i = 0; i < kBrickVoxels; ++i) {
+    const double value = values[std::size_t(i)];
+    if (value == background_) continue;
+    (isNegated(value) ? negated : others_).add(value, corner + voxelLocal(i));
+  }
+  if (negated.count() > 0) negatedPlaces_.push_back({corner, negated});
+}
+
+InactiveValues InactiveCounter::lostIn(const SparseVolume& volume) const {
+  InactiveValues lost = others_;
+  if (negated_.count() == 0 && negatedPlaces_.empty()) return lost;
+  std::optional<EmptySigns> signs;
+  if (volume.brickCount() > 0 && volume.background > 0.0f) signs.emplace(volume);
+  const bool isFilled = signs && signs->agree();
+  if (!isFilled) lost.add(negated_);
+  // A place without active voxels lies in one region of the empty space.
+  for (const Place& place : negatedPlaces_)
+    if (!isFilled || !signs->isInside(brickOf(place.corner))) lost.add(place.values);
+  return lost;
+}
+
 float narrowBackground(double background) {
   const auto narrow = float(background);
   if (!std::isfinite(narrow))
-    throw BadInput("its background, " + std::to_string(background) + ", is not a finite float");
+    throw CannotConvert("its background, " + std::to_string(background) +
+                        ", is not a finite float");
   return narrow;
 }
 
 void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
+  const std::string what =
+      "it has " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles included, and";
+  const double count = double(bricks), volumes = double(options.volumes);
   const bool isInFile = options.memory.isInFile(bricks * std::uint64_t(kValueBytes));
-  const double each = kEntryBytes + (isInFile ? 0.0 : kValueBytes);
-  requireWithinMemory(
-      double(bricks) * each, options.maxBytes,
-      "it has " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles included, and");
+  const double values = isInFile ? 0.0 : kValueBytes;
+  requireWithinMemory(count * (kListBytes + volumes * kEntryBytes + values), options.maxBytes,
+                      what);
+  if (isInFile) options.memory.requireRoom(count * volumes * kValueBytes, what);
 }
 
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
-  if (tally.count == 0 || nonFinite == NonFinite::kZero) return;
-  throw BadInput(std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
-                 " NaN, infinite or too large for float; the first is at " + toString(tally.first));
+  if (tally.count == 0 || nonFinite != NonFinite::kRefuse) return;
+  throw NotFinite(std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
+                  " NaN, infinite or too large for float; the first is at " +
+                  toString(tally.first));
 }
 
 void appendBricks(const TileSource& tile, std::vector<Coord>& corners) {

@@ -3,12 +3,15 @@
 /// intermediate copy.
 ///
 /// Active voxels keep their value, rounded to float. Inactive voxels become the background, because
-/// applications leave arbitrary values there. In a level set they become the background with the
-/// sign that they had, which distinguishes inside from outside.
+/// applications leave arbitrary values there; other values are counted (InactiveCounter). In a level
+/// set they become the background with the sign that they had, which distinguishes inside from
+/// outside.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,19 +26,28 @@ struct FillRules {
   float background = 0.0f;
   bool levelSet = false;
   NonFinite nonFinite = NonFinite::kRefuse;
+  float nonFiniteValue = 0.0f;
   bool allowEmpty = false;
+  bool countInactive = true;  ///< false for leaves whose inactive values are approximations
+
+  /// What a voxel becomes that is not finite and is not refused.
+  [[nodiscard]] float replacement() const {
+    return nonFinite == NonFinite::kBackground ? background : nonFiniteValue;
+  }
 };
 
 /// The background as float. \throws BadInput  it is not finite as float
 float narrowBackground(double background);
 
-/// \throws MemoryExceeded  the bricks take more than options.maxBytes
+/// \throws MemoryExceeded  the bricks take more than options.maxBytes, or their values more than the
+///                         disk has free if they are kept in files
 void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options);
 
 /// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
 struct NonFiniteTally {
+  float replacement = 0.0f;  ///< which they become
   std::uint64_t count = 0;
-  Coord first;  ///< the first one in the order of bricks and of voxels in a brick
+  Coord first{};  ///< the first one in the order of bricks and of voxels in a brick
 
   void add(Coord voxel) {
     if (count++ == 0 || std::pair(brickOf(voxel), voxel) < std::pair(brickOf(first), first))
@@ -45,11 +57,53 @@ struct NonFiniteTally {
 /// \throws BadInput  there are such voxels, and they are not to be replaced
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite);
 
-/// An active tile.
+/// A tile.
 struct TileSource {
   Coord corner;
   std::int32_t extent = 0;  ///< side, voxels
   double value = 0.0;
+};
+
+/// Counts inactive values that are lost because a volume does not hold them.
+class InactiveCounter {
+ public:
+  InactiveCounter(double background, bool levelSet)
+      : background_(background), levelSet_(levelSet) {}
+
+  /// Adds an inactive voxel of a leaf that has active voxels, too.
+  void voxel(double value, Coord at) {
+    if (value != background_) (isNegated(value) ? negated_ : others_).add(value, at);
+  }
+  /// Adds an inactive tile.
+  void tile(const TileSource& tile);
+  /// Adds a leaf without active voxels.
+  /// \param values  in voxelOffset order
+  void leaf(std::span<const double, kBrickVoxels> values, Coord corner);
+
+  /// The values that a writer does not restore from the volume: all that are not the background,
+  /// but for the background with a negative sign in a level set where a flood fill restores it.
+  [[nodiscard]] InactiveValues lostIn(const SparseVolume& volume) const;
+
+ private:
+  /// Values in a tile or a leaf without active voxels.
+  struct Place {
+    Coord corner;
+    InactiveValues values;
+  };
+
+  [[nodiscard]] bool isNegated(double value) const { return levelSet_ && value == -background_; }
+
+  double background_;
+  bool levelSet_;
+  InactiveValues others_;
+  InactiveValues negated_;              ///< in leaves with active voxels
+  std::vector<Place> negatedPlaces_{};  ///< elsewhere
+};
+
+/// What is found while a volume is filled.
+struct FillTallies {
+  NonFiniteTally nonFinite;
+  InactiveCounter inactive;
 };
 
 /// Appends the corners of the bricks that a tile covers.
@@ -65,32 +119,45 @@ SparseVolume layOutBricks(std::vector<Coord>& corners, const FillRules& rules,
 /// Number of the brick with this corner. \throws BadInput  the volume does not have it
 std::size_t brickAt(const SparseVolume& volume, Coord corner);
 
-/// Fills the bricks that a tile covers.
+/// Fills the bricks that an active tile covers.
 void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tally);
 
-/// An active value as float. A value that float cannot hold is counted and becomes 0.
+/// An active value as float. A value that float cannot hold is counted and replaced.
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   const auto narrow = float(value);
   if (std::isfinite(narrow)) return narrow;
   tally.add(voxel);
-  return 0.0f;
+  return tally.replacement;
 }
 
 /// Fills brick b. access.value(leaf, i) is a leaf's voxel in voxelOffset order, and
 /// access.mask(leaf) holds its active voxels.
 template <class Leaf, class Access>
 void fillFromLeaf(const Leaf& leaf, const Access& access, const FillRules& rules, std::size_t b,
-                  SparseVolume& volume, NonFiniteTally& tally) {
+                  SparseVolume& volume, FillTallies& tallies) {
   const Coord corner = volume.brickCorner(b);
   const auto out = volume.brickValues(b);
   const BrickMask active = volume.active[b] = access.mask(leaf);
   for (int i = 0; i < kBrickVoxels; ++i) {
     const auto value = access.value(leaf, i);
-    if (active.test(i))
-      out[i] = narrowValue(double(value), corner + voxelLocal(i), tally);
-    else if (rules.levelSet)
+    if (active.test(i)) {
+      out[i] = narrowValue(double(value), corner + voxelLocal(i), tallies.nonFinite);
+      continue;
+    }
+    if (rules.countInactive) tallies.inactive.voxel(double(value), corner + voxelLocal(i));
+    if (rules.levelSet)
       out[i] = value < 0 ? -std::abs(rules.background) : std::abs(rules.background);
   }
+}
+
+/// Counts the values of a leaf without active voxels, which has no brick.
+template <class Leaf, class Access>
+void countInactiveLeaf(const Leaf& leaf, const Access& access, const FillRules& rules, Coord corner,
+                       FillTallies& tallies) {
+  if (!rules.countInactive) return;
+  std::array<double, kBrickVoxels> values{};
+  for (int i = 0; i < kBrickVoxels; ++i) values[std::size_t(i)] = double(access.value(leaf, i));
+  tallies.inactive.leaf(values, corner);
 }
 
 }  // namespace esvr::vdb

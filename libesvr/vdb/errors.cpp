@@ -13,6 +13,12 @@ namespace {
 void rethrowCommon(const std::string& where) {
   try {
     throw;
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const NotFinite& e) {
+    throw NotFinite(where + e.what());
+  } catch (const CannotConvert& e) {
+    throw CannotConvert(where + e.what());
   } catch (const BadInput& e) {
     throw BadInput(where + e.what());
   } catch (const UsageError& e) {

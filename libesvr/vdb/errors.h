@@ -5,6 +5,8 @@
 #include <string>
 #include <utility>
 
+#include "esvr/grid_names.h"
+
 namespace esvr::vdb {
 
 /// Rethrows the current exception as an esvr::Error whose text begins with `where`. The library's
@@ -25,13 +27,20 @@ decltype(auto) whileReading(const std::filesystem::path& path, Body&& body) {
 
 /// Runs `body` and adds the name of a grid to the text of its errors. It is used inside
 /// whileReading.
-template <class Body>
-decltype(auto) inGrid(const std::string& name, Body&& body) {
+/// \param nameOf  gives the name as users see it; it is called if there is an error
+template <class NameOf, class Body>
+decltype(auto) inNamedGrid(const NameOf& nameOf, Body&& body) {
   try {
     return std::forward<Body>(body)();
   } catch (...) {
-    rethrowWhileReading("grid \"" + name + "\": ");
+    rethrowWhileReading("grid \"" + nameOf() + "\": ");
   }
+}
+
+/// The same for a name from a file.
+template <class Body>
+decltype(auto) inGrid(const std::string& name, Body&& body) {
+  return inNamedGrid([&] { return shownName(name); }, std::forward<Body>(body));
 }
 
 template <class Body>

@@ -1,5 +1,9 @@
 // The public functions that need OpenVDB.
 
+#include <utility>
+
+#include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/library.h"
 
 namespace esvr {
@@ -8,19 +12,56 @@ std::string vdbVersions() { return vdb::library().vdbVersions(); }
 
 VdbSummary inspectVdb(const std::filesystem::path& path) { return vdb::library().inspectVdb(path); }
 
+namespace {
+
+/// Finds a grid that a user has named.
+NamedGrid namedIn(const std::filesystem::path& path, const std::string& name) {
+  std::vector<std::string> names;
+  for (const GridSummary& grid : inspectVdb(path).grids) names.push_back(grid.name);
+  return GridNames(std::move(names)).find(name, path);
+}
+
+/// The place of a grid that a user has named, of which components cannot be read.
+std::size_t placeIn(const std::filesystem::path& path, const std::string& name) {
+  const NamedGrid grid = namedIn(path, name);
+  if (grid.component)
+    throw BadInput(path.string() + ": \"" + shownName(name) +
+                   "\" is a component, which has no components of its own");
+  return grid.place;
+}
+
+}  // namespace
+
+VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
+                    const ReadOptions& options) {
+  return vdb::library().readGrid(path, place, options);
+}
+
 VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                     const ReadOptions& options) {
-  return vdb::library().readGrid(path, name, options);
+  const NamedGrid grid = namedIn(path, name);
+  return grid.component ? readComponent(path, grid.place, *grid.component, options)
+                        : readGrid(path, grid.place, options);
+}
+
+VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
+                         std::size_t component, const ReadOptions& options) {
+  return vdb::library().readComponent(path, place, component, options);
 }
 
 VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
                          std::size_t component, const ReadOptions& options) {
-  return vdb::library().readComponent(path, name, component, options);
+  return readComponent(path, placeIn(path, name), component, options);
+}
+
+VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
+                      const ReadOptions& options) {
+  return vdb::library().readVector(path, place, options);
 }
 
 VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
                       const ReadOptions& options) {
-  return vdb::library().readVector(path, name, options);
+  return readVector(path, placeIn(path, name), options);
 }
 
 std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,

@@ -1,5 +1,6 @@
 #include "vdb/grid_names.h"
 
+#include "esvr/error.h"
 #include "esvr/grid_names.h"
 
 namespace esvr::vdb {
@@ -18,8 +19,10 @@ void assignUniqueNames(std::vector<GridSummary>& grids) {
   for (std::size_t i = 0; i < grids.size(); ++i) grids[i].uniqueName = unique[i];
 }
 
-std::size_t findGrid(const std::vector<GridSummary>& grids, const std::string& wanted) {
-  return esvr::findGrid(namesOf(grids), wanted);
+void requireGrid(std::size_t place, std::size_t grids) {
+  if (place < grids) return;
+  throw BadInput("has no grid number " + std::to_string(place + 1) + ", only " +
+                 std::to_string(grids) + (grids == 1 ? " grid" : " grids"));
 }
 
 std::string notAFloatType(const std::string& valueType) {

@@ -11,8 +11,8 @@ namespace esvr::vdb {
 /// Sets the uniqueName of every grid.
 void assignUniqueNames(std::vector<GridSummary>& grids);
 
-/// Index of a grid by its name. \throws BadInput  there is no such grid
-std::size_t findGrid(const std::vector<GridSummary>& grids, const std::string& wanted);
+/// \throws BadInput  the file has no grid at this place
+void requireGrid(std::size_t place, std::size_t grids);
 
 /// The reason, for the user, why a grid of this type is skipped.
 std::string notAFloatType(const std::string& valueType);

@@ -30,7 +30,7 @@ std::uint64_t sizeOfRegularFile(const std::filesystem::path& path) {
 }  // namespace
 
 InputFile::InputFile(const std::filesystem::path& path)
-    : buffer_(kBufferBytes), size_(sizeOfRegularFile(path)) {
+    : buffer_(kBufferBytes), size_(sizeOfRegularFile(path)), end_(size_) {
   auto file = std::make_unique<std::ifstream>();
   file->rdbuf()->pubsetbuf(buffer_.data(), std::streamsize(buffer_.size()));
   errno = 0;
@@ -43,7 +43,8 @@ InputFile::InputFile(const std::filesystem::path& path)
 InputFile::InputFile(std::span<const std::byte> bytes)
     : memory_(std::make_unique<MemoryBuffer>(bytes)),
       stream_(std::make_unique<std::istream>(memory_.get())),
-      size_(bytes.size()) {
+      size_(bytes.size()),
+      end_(size_) {
   throwAtErrors();
 }
 
@@ -51,16 +52,28 @@ void InputFile::throwAtErrors() {
   stream_->exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
 }
 
+InputFile::Within::Within(InputFile& file, std::uint64_t end) : file_(file), before_(file.end_) {
+  if (end > before_)
+    throw BadInput("is truncated or damaged: it points to byte " + std::to_string(end) + ", " +
+                   file.endText());
+  file_.end_ = end;
+}
+
+std::string InputFile::endText() const {
+  return (end_ == size_ ? "the file has " : "this part of the file ends at byte ") +
+         std::to_string(end_);
+}
+
 void InputFile::need(std::uint64_t bytes) const {
-  if (bytes > remaining())
+  if (position_ > end_ || bytes > remaining())
     throw BadInput("is truncated or damaged: " + std::to_string(bytes) + " bytes expected at " +
-                   std::to_string(position_) + ", the file has " + std::to_string(size_));
+                   std::to_string(position_) + ", " + endText());
 }
 
 void InputFile::seek(std::uint64_t position) {
-  if (position > size_)
-    throw BadInput("is truncated or damaged: it points to byte " + std::to_string(position) +
-                   ", the file has " + std::to_string(size_));
+  if (position > end_)
+    throw BadInput("is truncated or damaged: it points to byte " + std::to_string(position) + ", " +
+                   endText());
   stream_->seekg(std::streamoff(position));
   position_ = position;
 }
@@ -93,6 +106,9 @@ std::string InputFile::readString() {
   return text;
 }
 
-void InputFile::followStream() { position_ = std::uint64_t(stream_->tellg()); }
+void InputFile::followStream() {
+  position_ = std::uint64_t(stream_->tellg());
+  need(0);
+}
 
 }  // namespace esvr::vdb

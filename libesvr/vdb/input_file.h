@@ -25,7 +25,22 @@ class InputFile {
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
   [[nodiscard]] std::uint64_t position() const { return position_; }
-  [[nodiscard]] std::uint64_t remaining() const { return size_ - position_; }
+  [[nodiscard]] std::uint64_t remaining() const { return end_ - position_; }
+
+  /// While it exists, the file ends at a position, so that a part of it cannot reach into the next
+  /// part. Objects may be nested; an inner one cannot go beyond an outer one.
+  class Within {
+   public:
+    /// \throws BadInput  the file has fewer bytes
+    Within(InputFile& file, std::uint64_t end);
+    ~Within() { file_.end_ = before_; }
+    Within(const Within&) = delete;
+    Within& operator=(const Within&) = delete;
+
+   private:
+    InputFile& file_;
+    std::uint64_t before_;
+  };
 
   /// \throws BadInput  fewer than `bytes` are left
   void need(std::uint64_t bytes) const;
@@ -47,15 +62,18 @@ class InputFile {
   /// The stream at position(), from which a library may read. It throws std::ios_base::failure at
   /// the end of the file. position() does not change before followStream() or seek() is called.
   std::istream& stream() { return *stream_; }
+  /// \throws BadInput  the library has read beyond the end that a Within has set
   void followStream();
 
  private:
   void throwAtErrors();
+  [[nodiscard]] std::string endText() const;
 
   std::vector<char> buffer_;
   std::unique_ptr<std::streambuf> memory_;  ///< null: a file
   std::unique_ptr<std::istream> stream_;
   std::uint64_t size_ = 0;
+  std::uint64_t end_ = 0;  ///< at most size_
   std::uint64_t position_ = 0;
 };
 

@@ -27,21 +27,19 @@ class Packer {
   virtual double write(const std::filesystem::path& path, const VoxelPacking& packing) const = 0;
 };
 
-/// The functions have the names, arguments and errors of the public ones.
+/// The functions have the names, arguments and errors of the public ones. Grids are given by their places.
 class Library {
  public:
   virtual ~Library() = default;
 
   [[nodiscard]] virtual std::string vdbVersions() const = 0;
   [[nodiscard]] virtual VdbSummary inspectVdb(const std::filesystem::path& path) const = 0;
-  [[nodiscard]] virtual VolumeGrid readGrid(const std::filesystem::path& path,
-                                            const std::string& name,
+  [[nodiscard]] virtual VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
                                             const ReadOptions& options) const = 0;
   [[nodiscard]] virtual VolumeGrid readComponent(const std::filesystem::path& path,
-                                                 const std::string& name, std::size_t component,
+                                                 std::size_t place, std::size_t component,
                                                  const ReadOptions& options) const = 0;
-  [[nodiscard]] virtual VectorGrid readVector(const std::filesystem::path& path,
-                                              const std::string& name,
+  [[nodiscard]] virtual VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
                                               const ReadOptions& options) const = 0;
   [[nodiscard]] virtual std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                                              std::span<const std::size_t> places,
@@ -68,7 +66,8 @@ class Library {
 /// \throws RuntimeFailure  the module is to be loaded, and cannot be
 [[nodiscard]] const Library& library();
 
-/// The file name of the module, and the C function in it that returns the `const Library*`.
+/// The file name of the module, and the C function in it that returns the `const Library*`. It takes the
+/// program's CancelSlot, so that the loops of the module are cancelled like those of the program.
 inline constexpr const char* kModule = "esvr_vdb.so";
 inline constexpr const char* kModuleFunction = "esvrVdbLibrary";
 

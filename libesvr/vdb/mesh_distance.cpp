@@ -1,12 +1,11 @@
 #include "esvr/mesh_distance.h"
 
+#include "core/parallel.h"
 #include "vdb/scalar_trees.h"
 
 #include <openvdb/math/Proximity.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/VolumeToMesh.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <limits>
@@ -107,7 +106,7 @@ MeshDistance larger(const MeshDistance& a, const MeshDistance& b) {
 /// The largest distance of a vertex of `from` to the mesh `to`.
 MeshDistance directed(const Mesh& from, const Mesh& to, const openvdb::math::Transform& world) {
   const NearestPoints nearest(to);
-  return tbb::parallel_reduce(
+  return parallelReduce(
       Range(0, from.points.size()), MeshDistance{},
       [&](const Range& range, MeshDistance found) {
         for (std::size_t p = range.begin(); p != range.end(); ++p) {

@@ -44,6 +44,13 @@ static_assert(sizeof(GridRow) == 176);
 
 std::uint32_t majorOf(std::uint32_t version) { return version >> 21; }
 
+/// A version of NanoVDB in full, because the first ones have the major version 0: "0.0.28".
+std::string versionText(std::uint32_t version) {
+  constexpr std::uint32_t kMinorMask = (1u << 11) - 1, kPatchMask = (1u << 10) - 1;
+  return std::to_string(majorOf(version)) + '.' + std::to_string((version >> 10) & kMinorMask) +
+         '.' + std::to_string(version & kPatchMask);
+}
+
 SegmentHeader readSegmentHeader(InputFile& file) {
   const auto header = file.read<SegmentHeader>();
   if (header.magic == kMagicGrid)
@@ -51,7 +58,7 @@ SegmentHeader readSegmentHeader(InputFile& file) {
   if (header.magic != kMagicOld && header.magic != kMagicFile)
     throw BadInput("is damaged: no NanoVDB header where one should be");
   if (majorOf(header.version) != NANOVDB_MAJOR_VERSION_NUMBER)
-    throw BadInput("was written by NanoVDB " + std::to_string(majorOf(header.version)) +
+    throw BadInput("was written by NanoVDB " + versionText(header.version) +
                    ", this program reads version " + std::to_string(NANOVDB_MAJOR_VERSION_NUMBER));
   return header;
 }

@@ -46,7 +46,7 @@ class NanoTree {
 
   [[nodiscard]] double background() const { return double(root_->background()); }
 
-  /// Calls onLeaf(corner, leaf) and onTile(corner, extent, value) for all active leaves and tiles.
+  /// Calls onLeaf(corner, leaf) and onTile(tile, isActive) for all leaves and tiles.
   template <class OnLeaf, class OnTile>
   void visit(OnLeaf&& onLeaf, OnTile&& onTile) const {
     for (std::uint32_t i = 0; i < root_->data()->mTableSize; ++i) {
@@ -55,8 +55,8 @@ class NanoTree {
       const Coord corner{origin[0], origin[1], origin[2]};
       if (tile.isChild())
         visitUpper(*node<Upper>(root_, tile.child), corner, onLeaf, onTile);
-      else if (tile.state)
-        onTile(corner, kUpperExtent, double(tile.value));
+      else
+        onTile({corner, kUpperExtent, double(tile.value)}, tile.state != 0);
     }
   }
 
@@ -95,8 +95,8 @@ class NanoTree {
       const Coord at = cell<Upper>(corner, n, kLowerExtent);
       if (data.mChildMask.isOn(n))
         visitLower(*node<Lower>(&upper, data.mTable[n].child), at, onLeaf, onTile);
-      else if (data.mValueMask.isOn(n))
-        onTile(at, kLowerExtent, double(data.mTable[n].value));
+      else
+        onTile({at, kLowerExtent, double(data.mTable[n].value)}, data.mValueMask.isOn(n));
     }
   }
 
@@ -107,8 +107,8 @@ class NanoTree {
       const Coord at = cell<Lower>(corner, n, kBrickSide);
       if (data.mChildMask.isOn(n))
         onLeaf(at, leaf(lower, data.mTable[n].child));
-      else if (data.mValueMask.isOn(n))
-        onTile(at, kBrickSide, double(data.mTable[n].value));
+      else
+        onTile({at, kBrickSide, double(data.mTable[n].value)}, data.mValueMask.isOn(n));
     }
   }
 
@@ -147,7 +147,9 @@ std::uint64_t countBricks(const NanoTree<Build>& tree, const ReadOptions& option
     refuseTooLarge(bricks, options);
   };
   tree.visit([&](Coord, const auto&) { add(kBrickSide); },
-             [&](Coord, std::int32_t extent, double) { add(extent); });
+             [&](const TileSource& tile, bool isActive) {
+               if (isActive) add(tile.extent);
+             });
   return bricks;
 }
 
@@ -160,11 +162,15 @@ std::vector<Coord> brickCorners(const NanoTree<Build>& tree, const ReadOptions& 
         using Leaf = std::decay_t<decltype(leaf)>;
         if (NanoLeafAccess<Leaf>::mask(leaf).count() > 0) corners.push_back(corner);
       },
-      [&](Coord corner, std::int32_t extent, double) {
-        appendBricks({corner, extent}, corners);
+      [&](const TileSource& tile, bool isActive) {
+        if (isActive) appendBricks(tile, corners);
       });
   return corners;
 }
+
+/// False for quantised values, whose inactive ones are only near those of the source.
+template <class Build>
+constexpr bool kHasExactValues = std::is_floating_point_v<Build>;
 
 template <class Build>
 void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGrid& grid) {
@@ -173,21 +179,31 @@ void readVoxelsAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGr
   const NanoTree<Build> tree(buffer);
   grid.descriptor.background = tree.background();
   const FillRules rules{narrowBackground(tree.background()),
-                        grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
-                        options.allowEmpty};
+                        grid.descriptor.gridClass == GridClass::kLevelSet,
+                        options.nonFinite,
+                        options.nonFiniteValue,
+                        options.allowEmpty,
+                        kHasExactValues<Build>};
   auto corners = brickCorners(tree, options);
   SparseVolume& volume = grid.volume = layOutBricks(corners, rules, options.memory);
-  NonFiniteTally tally;
+  FillTallies tallies{{.replacement = rules.replacement()},
+                      InactiveCounter(tree.background(), rules.levelSet)};
   tree.visit(
       [&](Coord corner, const Leaf& leaf) {
-        if (Access::mask(leaf).count() == 0) return;
-        fillFromLeaf(leaf, Access{}, rules, brickAt(volume, corner), volume, tally);
+        if (Access::mask(leaf).count() == 0)
+          countInactiveLeaf(leaf, Access{}, rules, corner, tallies);
+        else
+          fillFromLeaf(leaf, Access{}, rules, brickAt(volume, corner), volume, tallies);
       },
-      [&](Coord corner, std::int32_t extent, double value) {
-        fillTile({corner, extent, value}, volume, tally);
+      [&](const TileSource& tile, bool isActive) {
+        if (isActive)
+          fillTile(tile, volume, tallies.nonFinite);
+        else
+          tallies.inactive.tile(tile);
       });
-  refuseNonFinite(tally, rules.nonFinite);
-  grid.nonFiniteReplaced = tally.count;
+  refuseNonFinite(tallies.nonFinite, rules.nonFinite);
+  grid.nonFiniteReplaced = tallies.nonFinite.count;
+  grid.inactive = tallies.inactive.lostIn(volume);
 }
 
 /// The map as the simplest map of OpenVDB that is equal to it. NanoVDB stores an affine map only.

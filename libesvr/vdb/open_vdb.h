@@ -10,12 +10,12 @@ class OpenVdb final : public Library {
  public:
   [[nodiscard]] std::string vdbVersions() const override;
   [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path) const override;
-  [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
+  [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
                                     const ReadOptions& options) const override;
-  [[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
+  [[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
                                          std::size_t component,
                                          const ReadOptions& options) const override;
-  [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
+  [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
                                       const ReadOptions& options) const override;
   [[nodiscard]] std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                                      std::span<const std::size_t> places,

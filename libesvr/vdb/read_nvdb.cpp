@@ -45,15 +45,16 @@ VdbSummary inspectNanoVdb(InputFile& file) {
   return {"NanoVDB", file.size(), {}, summarise(readNanoDirectory(file))};
 }
 
-VolumeGrid readNanoVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options) {
+VolumeGrid readNanoVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options) {
   const auto entries = readNanoDirectory(file);
   const auto grids = summarise(entries);
-  const std::size_t i = findGrid(grids, name);
-  return inGrid(grids[i].uniqueName, [&] {
-    if (!isScalarFloatNano(entries[i].gridType)) throw BadInput(grids[i].skipReason);
-    const NanoBuffer buffer = readNanoBuffer(file, entries[i], options.maxBytes);
-    VolumeGrid grid = readNanoVoxels(buffer, entries[i].gridType, grids[i].gridClass, options);
-    grid.descriptor.name = grids[i].name;
+  requireGrid(place, grids.size());
+  return inGrid(grids[place].uniqueName, [&] {
+    if (!isScalarFloatNano(entries[place].gridType)) throw BadInput(grids[place].skipReason);
+    const NanoBuffer buffer = readNanoBuffer(file, entries[place], options.maxBytes);
+    VolumeGrid grid =
+        readNanoVoxels(buffer, entries[place].gridType, grids[place].gridClass, options);
+    grid.descriptor.name = grids[place].name;
     return grid;
   });
 }

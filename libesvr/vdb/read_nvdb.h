@@ -1,7 +1,8 @@
 #pragma once
-/// Implements inspectVdb and readGrid for .nvdb files. Errors do not name the file.
+/// Implements inspectVdb and readGrid for .nvdb files. Grids are given by their
+/// places in the file. Errors do not name the file.
 
-#include <string>
+#include <cstddef>
 
 #include "esvr/vdb_io.h"
 #include "vdb/input_file.h"
@@ -9,6 +10,6 @@
 namespace esvr::vdb {
 
 VdbSummary inspectNanoVdb(InputFile& file);
-VolumeGrid readNanoVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options);
+VolumeGrid readNanoVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options);
 
 }  // namespace esvr::vdb

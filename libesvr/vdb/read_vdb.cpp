@@ -3,8 +3,10 @@
 #include <openvdb/Grid.h>
 
 #include <algorithm>
+#include <map>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/archive.h"
 #include "vdb/carry.h"
 #include "vdb/errors.h"
@@ -18,12 +20,15 @@ namespace {
 
 using openvdb::GridBase;
 
-/// A file and the list of its grids, in the same order.
-struct ListedArchive {
-  Archive archive;
-  std::vector<GridHead> heads;
-  std::vector<GridSummary> grids;
+/// A grid of an archive and what is known of it before its voxels are read.
+struct ListedGrid {
+  std::size_t place = 0;
+  GridHead head;
+  GridSummary summary;
 };
+
+/// What trees hold, by their owners' positions. A tree that many grids share is surveyed once.
+using Surveys = std::map<std::uint64_t, TreeSurvey>;
 
 /// The class by OpenVDB's name for it, for example "level set"; kUnknown for any other text.
 GridClass gridClassOf(const std::string& text) {
@@ -49,7 +54,8 @@ std::string reasonToSkip(const ArchiveEntry& entry, const GridSummary& grid) {
   const std::string type = entry.valueType();
   if (isPointTree(entry.treeType)) return "it holds points (" + type + "), which cannot be fitted";
   if (type == "float" || type == "double")
-    return "its tree (" + entry.treeType + ") cannot be fitted; OpenVDB's standard tree can";
+    return "its tree (" + shownName(entry.treeType) +
+           ") cannot be fitted; OpenVDB's standard tree can";
   return notAFloatType(type);
 }
 
@@ -66,21 +72,25 @@ bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) 
   return true;
 }
 
-void countFromTree(Archive& archive, const ArchiveEntry& entry, GridSummary& grid) {
+void countFromTree(Archive& archive, const ArchiveEntry& entry, Surveys& surveys,
+                   GridSummary& grid) {
   if (!isScalarFloatTree(entry) && !isVectorTree(entry)) return;
-  const TreeSurvey survey = surveyTree(archive, entry);
-  grid.activeVoxels = survey.activeVoxels;
-  grid.activeBox = survey.activeBox;
+  const std::uint64_t owner = archive.treeOwner(entry).gridAt;
+  auto survey = surveys.find(owner);
+  if (survey == surveys.end()) survey = surveys.emplace(owner, surveyTree(archive, entry)).first;
+  grid.activeVoxels = survey->second.activeVoxels;
+  grid.activeBox = survey->second.activeBox;
 }
 
-GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHead& head) {
+GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHead& head,
+                      Surveys& surveys) {
   GridSummary grid;
   grid.name = stringValue(head.metadata, GridBase::META_GRID_NAME);
   grid.valueType = entry.valueType();
   grid.savedAsHalf = entry.savedAsHalf;
   grid.storedBytes = entry.gridBytes;
   grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
-  if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, grid);
+  if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, surveys, grid);
   grid.isScalar = isScalarFloatTree(entry);
   grid.isVector =
       isVectorTree(entry) && grid.activeVoxels > 0 && grid.gridClass != GridClass::kLevelSet;
@@ -89,16 +99,32 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
   return grid;
 }
 
-ListedArchive listGrids(Archive archive) {
-  ListedArchive listed{std::move(archive), {}, {}};
-  for (const auto& entry : listed.archive.entries()) {
-    inGrid(entry.name(), [&] {
-      listed.heads.push_back(listed.archive.readHead(entry));
-      listed.grids.push_back(summarise(listed.archive, entry, listed.heads.back()));
-    });
-  }
-  assignUniqueNames(listed.grids);
-  return listed;
+/// The name of a grid in errors: the unique name in the list of grids.
+std::string shownNameOf(const Archive& archive, std::size_t place) {
+  std::vector<std::string> names;
+  for (const ArchiveEntry& entry : archive.entries()) names.push_back(entry.name());
+  return GridNames(std::move(names)).unique(place);
+}
+
+/// Runs `body` and adds the name of a grid to the text of its errors.
+template <class Body>
+decltype(auto) inGridAt(const Archive& archive, std::size_t place, Body&& body) {
+  return inNamedGrid([&] { return shownNameOf(archive, place); }, std::forward<Body>(body));
+}
+
+/// Lists one grid, whatever other grids the archive has. Its unique name is not set.
+ListedGrid listGrid(Archive& archive, std::size_t place, Surveys& surveys) {
+  requireGrid(place, archive.entries().size());
+  return inGridAt(archive, place, [&] {
+    const ArchiveEntry& entry = archive.entries()[place];
+    ListedGrid listed{place, archive.readHead(entry), {}};
+    listed.summary = summarise(archive, entry, listed.head, surveys);
+    return listed;
+  });
+}
+ListedGrid listGrid(Archive& archive, std::size_t place) {
+  Surveys none;
+  return listGrid(archive, place, none);
 }
 
 ValueType valueTypeOf(const GridSummary& grid) {
@@ -107,27 +133,31 @@ ValueType valueTypeOf(const GridSummary& grid) {
 }
 
 /// \param component  of a grid of vectors; 0 for others
-VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
+VolumeGrid readTree(Archive& archive, const ListedGrid& listed, std::size_t component,
                     const ReadOptions& options) {
-  const GridSummary& summary = listed.grids[i];
-  TreeVoxels voxels = readVoxels(listed.archive, listed.archive.entries()[i],
-                                 {summary.gridClass, component}, options);
+  const GridSummary& summary = listed.summary;
+  TreeVoxels voxels =
+      readVoxels(archive, archive.entries()[listed.place], {summary.gridClass, component}, options);
   VolumeGrid grid;
   grid.descriptor.name = summary.name;
   grid.descriptor.gridClass = summary.gridClass;
   grid.descriptor.valueType = valueTypeOf(summary);
   grid.descriptor.background = voxels.background;
-  grid.descriptor.transform = listed.heads[i].transform;
-  grid.descriptor.metadata = withoutFileStatistics(listed.heads[i].metadata);
+  grid.descriptor.transform = listed.head.transform;
+  grid.descriptor.metadata = withoutFileStatistics(listed.head.metadata);
   grid.volume = std::move(voxels.volume);
   grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
+  grid.inactive = voxels.inactive;
   return grid;
 }
 
-VolumeGrid readListedGrid(ListedArchive& listed, std::size_t i, const ReadOptions& options) {
-  // Only the type is checked here. Statistics that call the grid empty may be wrong.
-  if (!isScalarFloatTree(listed.archive.entries()[i])) throw BadInput(listed.grids[i].skipReason);
-  return readTree(listed, i, 0, options);
+VolumeGrid readListedGrid(Archive& archive, const ListedGrid& listed, const ReadOptions& options) {
+  return inGridAt(archive, listed.place, [&] {
+    // Only the type is checked here. Statistics that call the grid empty may be wrong.
+    if (!isScalarFloatTree(archive.entries()[listed.place]))
+      throw BadInput(listed.summary.skipReason);
+    return readTree(archive, listed, 0, options);
+  });
 }
 
 void requireVector(const GridSummary& grid) {
@@ -136,11 +166,11 @@ void requireVector(const GridSummary& grid) {
 }
 
 /// Adds the component to the text of errors.
-VolumeGrid readListedComponent(ListedArchive& listed, std::size_t i, std::size_t component,
+VolumeGrid readListedComponent(Archive& archive, const ListedGrid& listed, std::size_t component,
                                const ReadOptions& options) {
-  inGrid(listed.grids[i].uniqueName, [&] { requireVector(listed.grids[i]); });
-  return inGrid(componentName(listed.grids[i].uniqueName, component),
-                [&] { return readTree(listed, i, component, options); });
+  inGridAt(archive, listed.place, [&] { requireVector(listed.summary); });
+  return inNamedGrid([&] { return componentName(shownNameOf(archive, listed.place), component); },
+                     [&] { return readTree(archive, listed, component, options); });
 }
 
 /// The options with the memory that the components before leave.
@@ -151,15 +181,16 @@ ReadOptions besides(const SparseVolume& volume, ReadOptions options) {
   return options;
 }
 
-VectorGrid readListedVector(ListedArchive& listed, std::size_t i, ReadOptions options) {
+VectorGrid readListedVector(Archive& archive, const ListedGrid& listed, ReadOptions options) {
   VectorGrid vectors;
   for (std::size_t c = 0; c < kComponents; ++c) {
-    VolumeGrid component = readListedComponent(listed, i, c, options);
+    VolumeGrid component = readListedComponent(archive, listed, c, options);
     options = besides(component.volume, options);
     vectors.background[c] = component.descriptor.background;
     if (c == 0) vectors.descriptor = std::move(component.descriptor);
     vectors.components[c] = std::move(component.volume);
     vectors.nonFiniteReplaced += component.nonFiniteReplaced;
+    vectors.inactive.add(component.inactive.ofComponent(c));
   }
   return vectors;
 }
@@ -167,49 +198,52 @@ VectorGrid readListedVector(ListedArchive& listed, std::size_t i, ReadOptions op
 }  // namespace
 
 VdbSummary inspectOpenVdb(InputFile& file) {
-  ListedArchive listed = listGrids(Archive(file));
-  return {"OpenVDB", file.size(), listed.archive.metadata(), std::move(listed.grids)};
+  Archive archive(file);
+  VdbSummary summary{"OpenVDB", file.size(), archive.metadata(), {}};
+  Surveys surveys;
+  for (std::size_t place = 0; place < archive.entries().size(); ++place)
+    summary.grids.push_back(std::move(listGrid(archive, place, surveys).summary));
+  assignUniqueNames(summary.grids);
+  return summary;
 }
 
-VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options) {
-  ListedArchive listed = listGrids(Archive(file));
-  const std::size_t i = findGrid(listed.grids, name);
-  return inGrid(listed.grids[i].uniqueName, [&] { return readListedGrid(listed, i, options); });
+VolumeGrid readOpenVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options) {
+  Archive archive(file);
+  return readListedGrid(archive, listGrid(archive, place), options);
 }
 
-VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::size_t component,
+VolumeGrid readOpenVdbComponent(InputFile& file, std::size_t place, std::size_t component,
                                 const ReadOptions& options) {
-  ListedArchive listed = listGrids(Archive(file));
-  VolumeGrid grid = readListedComponent(listed, findGrid(listed.grids, name), component, options);
+  Archive archive(file);
+  VolumeGrid grid = readListedComponent(archive, listGrid(archive, place), component, options);
   grid.descriptor.name = componentName(grid.descriptor.name, component);
   if (component > 0) grid.descriptor.metadata.clear();
   return grid;
 }
 
-VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options) {
-  ListedArchive listed = listGrids(Archive(file));
-  return readListedVector(listed, findGrid(listed.grids, name), options);
+VectorGrid readOpenVdbVector(InputFile& file, std::size_t place, const ReadOptions& options) {
+  Archive archive(file);
+  return readListedVector(archive, listGrid(archive, place), options);
 }
 
 GridSummary OpenVdb::inspectCarried(const CarriedGrid& grid) const {
-  return inGrid(grid.name, [&] {
-    InputFile file(std::span(grid.bytes));
-    return listGrids(Archive(file, grid)).grids.front();
-  });
+  InputFile file(std::span(grid.bytes));
+  Archive archive(file, grid);
+  GridSummary summary = listGrid(archive, 0).summary;
+  summary.uniqueName = shownName(summary.name);
+  return summary;
 }
 
 VolumeGrid OpenVdb::readGrid(const CarriedGrid& grid, const ReadOptions& options) const {
-  return inGrid(grid.name, [&] {
-    InputFile file(std::span(grid.bytes));
-    ListedArchive listed = listGrids(Archive(file, grid));
-    return readListedGrid(listed, 0, options);
-  });
+  InputFile file(std::span(grid.bytes));
+  Archive archive(file, grid);
+  return readListedGrid(archive, listGrid(archive, 0), options);
 }
 
 VectorGrid OpenVdb::readVector(const CarriedGrid& grid, const ReadOptions& options) const {
   InputFile file(std::span(grid.bytes));
-  ListedArchive listed = listGrids(Archive(file, grid));
-  return readListedVector(listed, 0, options);
+  Archive archive(file, grid);
+  return readListedVector(archive, listGrid(archive, 0), options);
 }
 
 }  // namespace esvr::vdb

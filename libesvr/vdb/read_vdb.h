@@ -1,7 +1,8 @@
 #pragma once
-/// Implements inspectVdb and readGrid for .vdb files. Errors do not name the file.
+/// Implements inspectVdb and readGrid for .vdb files. Grids are given by their
+/// places in the file. Errors do not name the file.
 
-#include <string>
+#include <cstddef>
 
 #include "esvr/vdb_io.h"
 #include "vdb/input_file.h"
@@ -9,9 +10,9 @@
 namespace esvr::vdb {
 
 VdbSummary inspectOpenVdb(InputFile& file);
-VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadOptions& options);
-VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::size_t component,
+VolumeGrid readOpenVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options);
+VolumeGrid readOpenVdbComponent(InputFile& file, std::size_t place, std::size_t component,
                                 const ReadOptions& options);
-VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options);
+VectorGrid readOpenVdbVector(InputFile& file, std::size_t place, const ReadOptions& options);
 
 }  // namespace esvr::vdb

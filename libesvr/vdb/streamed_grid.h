@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/parallel.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
@@ -45,6 +46,23 @@ std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
   return leaf;
 }
 
+/// Makes leaves of bricks with active voxels if all voxels are in tiles. Cycles of Blender 3.4 draws
+/// nothing of a grid without a leaf, and all of its tiles if there is one. It draws the border of a
+/// leaf farther out than that of a tile, so that a single leaf among tiles stands out.
+/// All bricks of a small grid therefore remain leaves, and one of a larger grid.
+template <class Tree>
+void keepLeaves(const SparseVolume& volume, Tree& tree) {
+  constexpr std::size_t kMostLeaves = 512;  // a constant leaf takes about 200 bytes of a file
+  if (tree.cbeginLeaf()) return;
+  const bool keepsAll = volume.brickCount() <= kMostLeaves;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    const Coord corner = volume.brickCorner(b);
+    tree.touchLeaf(openvdb::Coord(corner.x, corner.y, corner.z));
+    if (!keepsAll) return;
+  }
+}
+
 /// \tparam Voxels  NumberVoxels or VectorVoxels
 template <class Tree, class Voxels>
 class StreamedGrid : public openvdb::Grid<Tree> {
@@ -52,12 +70,18 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   using Leaf = typename Tree::LeafNodeType;
   using Value = typename Tree::ValueType;
 
-  /// \param constantTiles  bricks whose voxels are all active and equal become tiles
+  /// \param constantTiles  bricks whose voxels are all active and equal become tiles, unless no
+  ///                       leaf would remain (keepLeaves)
   StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
       : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
-    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) add(b, constantTiles, accessor);
-    if (constantTiles) mergeTiles();
+    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) {
+      throwIfCancelled();
+      add(b, constantTiles, accessor);
+    }
+    if (!constantTiles) return;
+    mergeTiles();
+    keepLeaves(voxels_.bricks(), this->tree());
   }
 
   /// The bytes that the grid takes where it is read again, with its voxels.
@@ -67,6 +91,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
 
   void writeBuffers(std::ostream& stream) const override {
     for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
+      throwIfCancelled();
       const Coord corner{leaf->origin().x(), leaf->origin().y(), leaf->origin().z()};
       const auto b =
           findBrick(voxels_.bricks(), brickOf(corner) - brickOf(voxels_.bricks().origin));

@@ -3,6 +3,7 @@
 #include <openvdb/math/Maps.h>
 
 #include <cmath>
+#include <span>
 #include <sstream>
 
 #include "esvr/error.h"
@@ -83,7 +84,18 @@ math::Transform::Ptr toOpenVdb(const Transform& transform) {
   stream.exceptions(std::ios::badbit | std::ios::failbit | std::ios::eofbit);
   openvdb::io::setCurrentVersion(stream);
   auto result = math::Transform::createLinearTransform();
-  result->read(stream);
+  try {
+    if (isFrustum(transform.mapType)) {
+      InputFile map(std::span(transform.map));
+      checkFrustum(map);
+    }
+    const auto bytes = std::size_t(stream.tellp());
+    result->read(stream);
+    if (std::size_t(stream.tellg()) != bytes) throw BadInput("bytes are left");
+  } catch (const std::exception&) {
+    throw BadInput("the transform is damaged: " + std::to_string(transform.map.size()) +
+                   " bytes are not a map of type " + transform.mapType);
+  }
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/io.h>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "vdb/brick_filler.h"
 #include "vdb/tree_walk.h"
@@ -48,60 +49,58 @@ struct LocatedTree {
   TreeSurvey survey;
 };
 
-ValueLayout layoutOf(const ArchiveEntry& owner, const GridHead& head) {
-  const bool isDouble = owner.valueType() == "double" || owner.valueType() == "vec3d";
-  const std::uint64_t numbers = isVectorTree(owner) ? kComponents : 1;
-  return {numbers * (isDouble ? sizeof(double) : sizeof(float)),
-          numbers * sizeof(openvdb::math::half), owner.savedAsHalf, head.compression};
-}
-
 LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
   const ArchiveEntry& owner = archive.treeOwner(entry);
   if (owner.treeType != entry.treeType)
     throw BadInput("is damaged: it shares the voxels of a grid of another type");
   GridHead head = archive.readHead(owner);
-  const ValueLayout layout = layoutOf(owner, head);
+  const ValueLayout layout =
+      layoutOf({owner.treeType, owner.savedAsHalf, head.compression}).value();
+  const InputFile::Within grid(archive.file(), owner.gridAt + owner.gridBytes);
   const TreeSurvey survey = surveyTree(archive.file(), layout);
   return {owner, std::move(head), layout, survey};
 }
 
 openvdb::Coord openVdbCoord(Coord c) { return {c.x, c.y, c.z}; }
 
-/// Notes the leaves and the active tiles of a tree.
+/// Notes the leaves and the active tiles of a tree, and counts the inactive tiles.
 template <class Value>
 class TopologyReader {
  public:
-  TopologyReader(InputFile& file, bool savedAsHalf, std::size_t component)
-      : file_(file), savedAsHalf_(savedAsHalf), component_(component) {}
+  TopologyReader(InputFile& file, bool savedAsHalf, std::size_t component,
+                 InactiveCounter& inactive)
+      : file_(file), savedAsHalf_(savedAsHalf), component_(component), inactive_(inactive) {}
 
   void leaf(Coord corner, const LeafMask& mask) {
     leaves.push_back(corner);
     if (mask.count() > 0) bricks.push_back(corner);
   }
 
-  void rootTile(Coord corner, std::uint64_t at) {
+  void rootTile(Coord corner, std::uint64_t at, bool isActive) {
     const std::uint64_t back = file_.position();
     file_.seek(at);
     Value value;
     file_.read(&value, sizeof value);
-    tile({corner, kUpperExtent, numberOf(value)});
+    add({corner, kUpperExtent, numberOf(value)}, isActive);
     file_.seek(back);
   }
 
   template <int kLog2>
-  void tiles(const NodeMask<kLog2>& mask, const TileValues& place, std::int32_t extent) {
+  void tiles(const NodeCells<NodeMask<kLog2>>& cells, std::int32_t extent) {
+    if (cells.onlyBackground && cells.active.count() == 0) return;
     using OpenVdbMask = openvdb::util::NodeMask<kLog2>;
     OpenVdbMask active;
-    for (openvdb::Index w = 0; w < mask.words.size(); ++w)
-      active.template getWord<openvdb::Index64>(w) = mask.words[w];
+    for (openvdb::Index w = 0; w < cells.active.words.size(); ++w)
+      active.template getWord<openvdb::Index64>(w) = cells.active.words[w];
     std::vector<Value> values(OpenVdbMask::SIZE);
-    file_.seek(place.at);
+    file_.seek(cells.at);
     openvdb::io::readCompressedValues(file_.stream(), values.data(), OpenVdbMask::SIZE, active,
                                       savedAsHalf_);
     file_.followStream();
-    mask.forEachSet([&](std::size_t n) {
-      tile({cellCorner<kLog2>(place.corner, n, extent), extent, numberOf(values[n])});
-    });
+    for (std::size_t n = 0; n < values.size(); ++n)
+      if (!cells.children.test(n))
+        add({cellCorner<kLog2>(cells.corner, n, extent), extent, numberOf(values[n])},
+            cells.active.test(n));
   }
 
   std::vector<Coord> leaves;  ///< in the file's order
@@ -113,7 +112,8 @@ class TopologyReader {
     return double(componentOf(value, component_));
   }
 
-  void tile(const TileSource& tile) {
+  void add(const TileSource& tile, bool isActive) {
+    if (!isActive) return inactive_.tile(tile);
     activeTiles.push_back(tile);
     appendBricks(tile, bricks);
   }
@@ -121,6 +121,7 @@ class TopologyReader {
   InputFile& file_;
   bool savedAsHalf_;
   std::size_t component_;
+  InactiveCounter& inactive_;
 };
 
 /// Reads the voxels of a tree leaf by leaf. There is no tree of OpenVDB in memory.
@@ -128,10 +129,7 @@ template <class Tree>
 class VoxelReader {
  public:
   VoxelReader(Archive& archive, const LocatedTree& located, std::size_t component)
-      : file_(archive.file()),
-        located_(located),
-        topology_(file_, located.owner.savedAsHalf, component),
-        component_(component) {
+      : file_(archive.file()), located_(located), component_(component) {
     openvdb::io::setDataCompression(file_.stream(), located.head.compression);
     file_.seek(located.head.treeAt + sizeof(std::int32_t));
     file_.read(&background_, sizeof background_);
@@ -143,16 +141,23 @@ class VoxelReader {
 
   [[nodiscard]] double background() const { return double(componentOf(background_, component_)); }
 
-  SparseVolume read(const FillRules& rules, const VoxelMemory& memory, NonFiniteTally& tally) {
+  SparseVolume read(const FillRules& rules, const VoxelMemory& memory, FillTallies& tallies) {
     file_.seek(located_.head.treeAt);
-    topology_.leaves.reserve(located_.survey.leaves);
-    topology_.bricks.reserve(located_.survey.leaves + located_.survey.tileBricks);
-    TreeWalk(file_, located_.layout, topology_).topology();
-    SparseVolume volume = layOutBricks(topology_.bricks, rules, memory);
-    topology_.bricks = {};
+    TopologyReader<Value> topology(file_, located_.owner.savedAsHalf, component_, tallies.inactive);
+    topology.leaves.reserve(located_.survey.leaves);
+    topology.bricks.reserve(located_.survey.leaves + located_.survey.tileBricks);
+    TreeWalk(file_, located_.layout, topology).topology();
+    SparseVolume volume = layOutBricks(topology.bricks, rules, memory);
+    topology.bricks = {};
     file_.seek(file_.position());  // OpenVDB reads on from there
-    for (const Coord corner : topology_.leaves) readLeaf(corner, rules, volume, tally);
-    for (const TileSource& tile : topology_.activeTiles) fillTile(tile, volume, tally);
+    for (const Coord corner : topology.leaves) {
+      throwIfCancelled();
+      readLeaf(corner, rules, volume, tallies);
+    }
+    for (const TileSource& tile : topology.activeTiles) {
+      throwIfCancelled();
+      fillTile(tile, volume, tallies.nonFinite);
+    }
     return volume;
   }
 
@@ -160,18 +165,21 @@ class VoxelReader {
   using Leaf = typename Tree::LeafNodeType;
   using Value = typename Tree::ValueType;
 
-  void readLeaf(Coord corner, const FillRules& rules, SparseVolume& volume, NonFiniteTally& tally) {
+  void readLeaf(Coord corner, const FillRules& rules, SparseVolume& volume, FillTallies& tallies) {
     Leaf leaf(openvdb::PartialCreate{}, openVdbCoord(corner), background_);
     leaf.readBuffers(file_.stream(), located_.owner.savedAsHalf);
     const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
     if (b.has_value() == leaf.valueMask().isOff())
       throw BadInput("is damaged: a leaf has two different masks");
-    if (b) fillFromLeaf(leaf, LeafAccess<Leaf>{component_}, rules, *b, volume, tally);
+    const LeafAccess<Leaf> access{component_};
+    if (b)
+      fillFromLeaf(leaf, access, rules, *b, volume, tallies);
+    else
+      countInactiveLeaf(leaf, access, rules, corner, tallies);
   }
 
   InputFile& file_;
   const LocatedTree& located_;
-  TopologyReader<Value> topology_;
   std::size_t component_;
   Value background_{};
 };
@@ -185,11 +193,13 @@ TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, const Want
   result.background = reader.background();
   const FillRules rules{narrowBackground(result.background),
                         wanted.gridClass == GridClass::kLevelSet, options.nonFinite,
-                        options.allowEmpty};
-  NonFiniteTally tally;
-  result.volume = reader.read(rules, options.memory, tally);
-  refuseNonFinite(tally, rules.nonFinite);
-  result.nonFiniteReplaced = tally.count;
+                        options.nonFiniteValue, options.allowEmpty};
+  FillTallies tallies{{.replacement = rules.replacement()},
+                      InactiveCounter(result.background, rules.levelSet)};
+  result.volume = reader.read(rules, options.memory, tallies);
+  refuseNonFinite(tallies.nonFinite, rules.nonFinite);
+  result.nonFiniteReplaced = tallies.nonFinite.count;
+  result.inactive = tallies.inactive.lostIn(result.volume);
   return result;
 }
 

@@ -22,6 +22,7 @@ struct TreeVoxels {
   SparseVolume volume;
   double background = 0.0;
   std::uint64_t nonFiniteReplaced = 0;
+  InactiveValues inactive{};
 };
 
 /// What is read of a tree.

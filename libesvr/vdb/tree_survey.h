@@ -13,6 +13,8 @@
 ///   the values, compressed as the grid's flags say.
 
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include "esvr/coord.h"
 #include "vdb/input_file.h"
@@ -25,7 +27,22 @@ struct ValueLayout {
   std::uint64_t halfBytes = 2;    ///< size of a value as half: 2 for float, 6 for vec3s, ...
   bool savedAsHalf = false;       ///< in blocks, not in the background and the root's tiles
   std::uint32_t compression = 0;  ///< OpenVDB's flags
+  /// How the values of a leaf are stored: as a mask and a block, in a number of bytes that is the
+  /// same for all leaves (bool, mask), or in a way of their own that is not known here (points).
+  enum class Leaves { kBlocks, kFixed, kOther } leaves = Leaves::kBlocks;
+  std::uint64_t leafBytes = 0;  ///< of kFixed
 };
+
+/// What decides how the values of a tree are stored.
+struct StoredTree {
+  std::string treeType;  ///< "Tree_float_5_4_3"
+  bool savedAsHalf = false;
+  std::uint32_t compression = 0;  ///< OpenVDB's flags
+};
+
+/// The layout of a tree; nothing if its nodes have other sizes than OpenVDB's usual ones, or if its
+/// type is unknown or has no fixed size, such as a string.
+[[nodiscard]] std::optional<ValueLayout> layoutOf(const StoredTree& tree);
 
 struct TreeSurvey {
   std::uint64_t leaves = 0;
@@ -36,5 +53,14 @@ struct TreeSurvey {
 
 /// Surveys the tree at the position of the file. \throws BadInput  it is truncated or damaged
 TreeSurvey surveyTree(InputFile& file, const ValueLayout& layout);
+
+/// Positions in a file; 0 if they are not known.
+struct TreeExtent {
+  std::uint64_t valuesAt = 0;  ///< of the values of the first leaf
+  std::uint64_t end = 0;       ///< behind the tree
+};
+
+/// Finds the end of the tree at the position of the file. \throws BadInput  as for surveyTree
+[[nodiscard]] TreeExtent extentOfTree(InputFile& file, const ValueLayout& layout);
 
 }  // namespace esvr::vdb

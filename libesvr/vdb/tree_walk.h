@@ -13,6 +13,7 @@
 #include <set>
 #include <string>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/sparse_volume.h"
 #include "vdb/input_file.h"
@@ -62,17 +63,21 @@ Coord cellCorner(Coord corner, std::size_t n, std::int32_t cellExtent) {
   return corner + cell * cellExtent;
 }
 
-/// The values of a node's tiles in the file.
-struct TileValues {
-  std::uint64_t at = 0;  ///< position of the node's block of values
-  Coord corner;          ///< corner of the node
+/// The cells of an inner node in the file. A cell has a child node or a tile.
+template <class Mask>
+struct NodeCells {
+  Mask children, active;  ///< the active cells are tiles
+  std::uint64_t at = 0;   ///< position of the node's block of values
+  /// True if all inactive tiles have the background.
+  bool onlyBackground = false;
+  Coord corner;  ///< corner of the node
 };
 
 /// Walks over the topology of a tree, which comes first in the file, and over the values of its
 /// leaves. A Visitor has these functions:
 ///   leaf(corner, mask)                      for each leaf, in the file's order
-///   rootTile(corner, at)                    for each active tile of the root; its value is at `at`
-///   tiles<kLog2>(mask, TileValues, extent)  for each node with active tiles; it may move the file
+///   rootTile(corner, at, isActive)          for each tile of the root; its value is at `at`
+///   tiles<kLog2>(NodeCells, extent)         for each inner node; it may move the file
 template <class Visitor>
 class TreeWalk {
  public:
@@ -91,6 +96,7 @@ class TreeWalk {
 
   /// Checks the values of a leaf. \throws BadInput  they are truncated or damaged
   void leafValues() {
+    if (layout_.leaves == ValueLayout::Leaves::kFixed) return file_.skip(layout_.leafBytes);
     const auto mask = file_.read<LeafMask>();
     valueBlock(mask);
   }
@@ -114,7 +120,7 @@ class TreeWalk {
     file_.skip(layout_.valueBytes);
     const auto active = file_.read<std::uint8_t>();
     if (active > 1) damaged("a flag that is neither 0 nor 1");
-    if (active) visitor_.rootTile(key, at);
+    visitor_.rootTile(key, at, active == 1);
   }
 
   void upperNode(Coord corner) {
@@ -124,6 +130,7 @@ class TreeWalk {
   }
 
   void lowerNode(Coord corner) {
+    throwIfCancelled();
     const auto children = nodeHead<LowerMask, kLowerLog2>(corner, kBrickSide);
     children.forEachSet(
         [&](std::size_t n) { leaf(cellCorner<kLowerLog2>(corner, n, kBrickSide)); });
@@ -138,16 +145,18 @@ class TreeWalk {
     const auto active = file_.read<Mask>();
     if (children.overlaps(active)) damaged("a cell that is both tile and node");
     const std::uint64_t at = file_.position();
-    valueBlock(active);
+    const auto packing = valueBlock(active);
     const std::uint64_t end = file_.position();
-    if (active.count() > 0) visitor_.template tiles<kLog2>(active, {at, corner}, cellExtent);
+    const bool onlyBackground = packing == openvdb::io::NO_MASK_OR_INACTIVE_VALS;
+    visitor_.template tiles<kLog2>(NodeCells<Mask>{children, active, at, onlyBackground, corner},
+                                   cellExtent);
     if (file_.position() != end) file_.seek(end);
     return children;
   }
 
-  /// Skips the block of a node's values.
+  /// Skips the block of a node's values. \return how its inactive values are stored
   template <class Mask>
-  void valueBlock(const Mask& active) {
+  std::int8_t valueBlock(const Mask& active) {
     const auto inactive = file_.read<std::int8_t>();
     if (inactive < openvdb::io::NO_MASK_OR_INACTIVE_VALS ||
         inactive > openvdb::io::NO_MASK_AND_ALL_VALS)
@@ -157,6 +166,7 @@ class TreeWalk {
     const bool activeOnly = (layout_.compression & openvdb::io::COMPRESS_ACTIVE_MASK) &&
                             inactive != openvdb::io::NO_MASK_AND_ALL_VALS;
     valueArray(activeOnly ? active.count() : Mask::kCells);
+    return inactive;
   }
 
   static std::uint64_t inactiveValues(std::int8_t inactive) {

@@ -1,4 +1,5 @@
 #include "core/atomic_file.h"
+#include "core/read_input.h"
 #include "esvr/error.h"
 #include "vdb/archive.h"
 #include "vdb/carry.h"
@@ -21,6 +22,24 @@ FileFormat formatOf(InputFile& file) {
   throw BadInput("is neither an OpenVDB nor a NanoVDB file");
 }
 
+/// Opens a file and reads from it. Its parts are read at different times and fit together only if
+/// it has not changed meanwhile; after a change, an error may also come from the mixture.
+template <class Read>
+auto readingFrom(const std::filesystem::path& path, const Read& read) {
+  const WatchedInputs watched({path});
+  try {
+    auto result = whileReading(path, [&] {
+      InputFile file(path);
+      return read(file);
+    });
+    watched.requireUnchanged();
+    return result;
+  } catch (const BadInput&) {
+    watched.requireUnchanged();
+    throw;
+  }
+}
+
 FileFormat formatNamedBy(const std::filesystem::path& path) {
   if (path.extension() == ".vdb") return FileFormat::kOpenVdb;
   if (path.extension() == ".nvdb") return FileFormat::kNanoVdb;
@@ -30,18 +49,16 @@ FileFormat formatNamedBy(const std::filesystem::path& path) {
 }  // namespace
 
 VdbSummary OpenVdb::inspectVdb(const std::filesystem::path& path) const {
-  return whileReading(path, [&] {
-    InputFile file(path);
+  return readingFrom(path, [&](InputFile& file) {
     return formatOf(file) == FileFormat::kOpenVdb ? inspectOpenVdb(file) : inspectNanoVdb(file);
   });
 }
 
-VolumeGrid OpenVdb::readGrid(const std::filesystem::path& path, const std::string& name,
+VolumeGrid OpenVdb::readGrid(const std::filesystem::path& path, std::size_t place,
                              const ReadOptions& options) const {
-  return whileReading(path, [&] {
-    InputFile file(path);
-    return formatOf(file) == FileFormat::kOpenVdb ? readOpenVdbGrid(file, name, options)
-                                                  : readNanoVdbGrid(file, name, options);
+  return readingFrom(path, [&](InputFile& file) {
+    return formatOf(file) == FileFormat::kOpenVdb ? readOpenVdbGrid(file, place, options)
+                                                  : readNanoVdbGrid(file, place, options);
   });
 }
 
@@ -50,8 +67,7 @@ namespace {
 /// Opens a file whose grids may be vectors. NanoVDB's vectors are not read.
 template <class Read>
 auto readVectors(const std::filesystem::path& path, const Read& read) {
-  return whileReading(path, [&] {
-    InputFile file(path);
+  return readingFrom(path, [&](InputFile& file) {
     if (formatOf(file) != FileFormat::kOpenVdb)
       throw BadInput("is a NanoVDB file, whose grids of vectors cannot be read");
     return read(file);
@@ -60,24 +76,23 @@ auto readVectors(const std::filesystem::path& path, const Read& read) {
 
 }  // namespace
 
-VolumeGrid OpenVdb::readComponent(const std::filesystem::path& path, const std::string& name,
+VolumeGrid OpenVdb::readComponent(const std::filesystem::path& path, std::size_t place,
                                   std::size_t component, const ReadOptions& options) const {
   return readVectors(
-      path, [&](InputFile& file) { return readOpenVdbComponent(file, name, component, options); });
+      path, [&](InputFile& file) { return readOpenVdbComponent(file, place, component, options); });
 }
 
-VectorGrid OpenVdb::readVector(const std::filesystem::path& path, const std::string& name,
+VectorGrid OpenVdb::readVector(const std::filesystem::path& path, std::size_t place,
                                const ReadOptions& options) const {
-  return readVectors(path, [&](InputFile& file) { return readOpenVdbVector(file, name, options); });
+  return readVectors(path,
+                     [&](InputFile& file) { return readOpenVdbVector(file, place, options); });
 }
 
 std::vector<CarriedGrid> OpenVdb::readCarried(const std::filesystem::path& path,
                                               std::span<const std::size_t> places,
                                               const ReadOptions& options) const {
-  return whileReading(path, [&] {
-    InputFile file(path);
-    return readOpenVdbCarried(file, places, options);
-  });
+  return readingFrom(path,
+                     [&](InputFile& file) { return readOpenVdbCarried(file, places, options); });
 }
 
 void OpenVdb::writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,

@@ -9,6 +9,7 @@
 
 #include "esvr/empty_signs.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/metadata.h"
 #include "vdb/streamed_grid.h"
 #include "vdb/transform.h"
@@ -57,25 +58,24 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
   // The flood fill overwrites active tiles, so it runs before there are any.
   if (levelSet && background > 0 && EmptySigns(source.volume).agree())
     openvdb::tools::signedFloodFill(tree);
-  if (options.constantTiles) openvdb::tools::prune(tree);
+  if (options.constantTiles) {
+    openvdb::tools::prune(tree);
+    keepLeaves(source.volume, tree);
+  }
   return grid;
 }
 
-bool wantsHalf(const GridDescriptor& descriptor, const GridBase& grid, HalfMode mode) {
-  if (mode != HalfMode::kAuto) return mode == HalfMode::kOn;
-  return descriptor.valueType == ValueType::kHalf || grid.saveFloatAsHalf();
-}
-
+bool isHalf(float value) { return float(openvdb::math::half(value)) == value; }
 bool fitsHalf(float value) { return std::isfinite(float(openvdb::math::half(value))); }
 
-void refuseBeyondHalf(const std::string& name, double background, const SparseVolume& volume) {
-  bool fits = fitsHalf(float(background));
-  for (std::size_t b = 0; fits && b < volume.brickCount(); ++b)
+/// True if all active voxels and the background are numbers of a kind.
+template <class Test>
+bool allAre(const SparseVolume& volume, double background, const Test& test) {
+  bool all = test(float(background));
+  for (std::size_t b = 0; all && b < volume.brickCount(); ++b)
     for (int i = 0; i < kBrickVoxels; ++i)
-      if (volume.active[b].test(i)) fits &= fitsHalf(volume.brickValues(b)[i]);
-  if (!fits)
-    throw UsageError("grid \"" + name +
-                     "\" has values beyond 65504, the largest that half precision holds");
+      if (volume.active[b].test(i)) all &= test(volume.brickValues(b)[i]);
+  return all;
 }
 
 /// Restores the properties in the source's metadata and then those in the descriptor, because a
@@ -88,13 +88,27 @@ void restoreDescriptor(const GridDescriptor& descriptor, GridBase& grid) {
   grid.setTransform(toOpenVdb(descriptor.transform));
 }
 
-/// Saves a grid as half where the options or the source want it.
-/// \param fits  refuses values that half cannot hold
-template <class Fits>
-void chooseHalf(const GridDescriptor& descriptor, const WriteOptions& options, const Fits& fits,
+/// True if a grid is saved as half without being asked for: its values are those of a source of
+/// halfs, and none is beyond them; or the source was saved as half in another way, such as doubles
+/// are, and halfs hold every value exactly. Otherwise rounding would add an error that no bound of
+/// the conversion includes.
+/// \param all  tells whether all values pass a test
+template <class All>
+bool remainsHalf(const GridDescriptor& descriptor, const All& all, const GridBase& grid) {
+  if (descriptor.valueType == ValueType::kHalf) return all(fitsHalf);
+  return grid.saveFloatAsHalf() && all(isHalf);
+}
+
+/// \throws UsageError  halfs are asked for, and a value is beyond them
+template <class All>
+void chooseHalf(const GridDescriptor& descriptor, const WriteOptions& options, const All& all,
                 GridBase& grid) {
-  const bool half = wantsHalf(descriptor, grid, options.half);
-  if (half) fits();
+  const bool half = options.half == HalfMode::kOn ||
+                    (options.half == HalfMode::kAuto && remainsHalf(descriptor, all, grid));
+  if (half && !all(fitsHalf))
+    throw UsageError("grid \"" + descriptor.name +
+                     "\" has values beyond 65504, the largest that half precision holds; do not "
+                     "ask for halfs");
   if (half != grid.saveFloatAsHalf()) grid.setSaveFloatAsHalf(half);
 }
 
@@ -117,12 +131,10 @@ GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& opti
   else
     grid = makeGrid<openvdb::FloatTree>(source, options, voxels);
   restoreDescriptor(source.descriptor, *grid);
-  chooseHalf(
-      source.descriptor, options,
-      [&] {
-        refuseBeyondHalf(source.descriptor.name, source.descriptor.background, source.volume);
-      },
-      *grid);
+  const auto all = [&](const auto& test) {
+    return allAre(source.volume, source.descriptor.background, test);
+  };
+  chooseHalf(source.descriptor, options, all, *grid);
   return grid;
 }
 
@@ -132,11 +144,13 @@ GridBase::Ptr makeOpenVdbGrid(const VectorGrid& source, const WriteOptions& opti
                            ? makeVectors<openvdb::Vec3DTree>(source, options)
                            : makeVectors<openvdb::Vec3STree>(source, options);
   restoreDescriptor(source.descriptor, *grid);
-  const auto fits = [&] {
-    for (std::size_t c = 0; c < kComponents; ++c)
-      refuseBeyondHalf(source.descriptor.name, source.background[c], source.components[c]);
+  const auto all = [&](const auto& test) {
+    bool passed = true;
+    for (std::size_t c = 0; passed && c < kComponents; ++c)
+      passed = allAre(source.components[c], source.background[c], test);
+    return passed;
   };
-  chooseHalf(source.descriptor, options, fits, *grid);
+  chooseHalf(source.descriptor, options, all, *grid);
   return grid;
 }
 

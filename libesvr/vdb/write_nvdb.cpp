@@ -3,6 +3,7 @@
 #include <fstream>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/make_nano.h"
 #include "vdb/volume_to_tree.h"
 
@@ -10,7 +11,7 @@ namespace esvr::vdb {
 namespace {
 
 void refuseWhatNanoVdbLacks(const VolumeGrid& grid, const WriteOptions& options) {
-  const std::string name = "grid \"" + grid.descriptor.name + "\": ";
+  const std::string name = "grid \"" + shownName(grid.descriptor.name) + "\": ";
   if (options.half == HalfMode::kOn)
     throw UsageError(name + ".nvdb files are not written as half; ask for .vdb");
   if (!grid.descriptor.transform.affine)
@@ -22,10 +23,11 @@ std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
   std::vector<const VolumeGrid*> volumes;
   for (const auto& grid : grids) {
     if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
-      throw UsageError("grid \"" + (*carried)->name + "\" (" + (*carried)->treeType +
+      throw UsageError("grid \"" + shownName((*carried)->name) + "\" (" +
+                       shownName((*carried)->treeType) +
                        ") is carried unchanged, which a .nvdb file cannot hold; ask for .vdb");
     if (const auto* vectors = std::get_if<const VectorGrid*>(&grid))
-      throw UsageError("grid \"" + (*vectors)->descriptor.name +
+      throw UsageError("grid \"" + shownName((*vectors)->descriptor.name) +
                        "\" has vectors, which are not written to .nvdb files; ask for .vdb");
     volumes.push_back(std::get<const VolumeGrid*>(grid));
   }
@@ -36,6 +38,7 @@ std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
 
 void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite> grids,
                   const WriteOptions& options) {
+  if (grids.empty()) throw BadInput("a .nvdb file cannot be written without a grid; ask for .vdb");
   const auto volumes = volumesOf(grids);
   for (const VolumeGrid* grid : volumes) refuseWhatNanoVdbLacks(*grid, options);
   WriteOptions whole = options;

@@ -33,6 +33,7 @@ std::string cameraMessage(const Collection& collection, const json& request) {
   CameraWish wish;
   if (members.flag("orthographic").value_or(false)) wish.projection = Projection::kOrthographic;
   wish.direction = directionIn(members);
+  wish.voxel = voxelShape(scene.transform.affine).value_or(VoxelShape{});
   return textOf(
       {{"type", "camera"}, {"camera", jsonOf(fitCamera(scene.box, wish, sizeOf(request, "fit")))}});
 }

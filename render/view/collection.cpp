@@ -21,25 +21,16 @@ ReadLimits limitsOf(const cli::HostMemory& memory) {
   return limits;
 }
 
-std::vector<std::string> gridNamesOf(const EsvrFile& file) {
-  std::vector<std::string> names;
-  for (const StoredGrid& grid : file.grids) names.push_back(grid.descriptor.name);
-  return uniqueNames(names);
-}
-
 /// The grids of a file or of a frame that have something active.
-std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary,
-                               const render::SceneFile& from) {
+std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary) {
   std::vector<ShownGrid> grids;
-  const auto names = gridNamesOf(file);
+  const auto names = namesOfStored(file);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    render::SceneFile of = from;
-    of.grid = names[i];
-    auto outline = outlinesOf(file, of);
-    if (!outline) continue;
     const StoredGrid& stored = file.grids[i];
+    if (stored.activeBox.empty()) continue;
+    std::vector<render::Scene> outline{render::outlineOf(stored, names[i])};
     grids.push_back({names[i], stored.voxels ? "voxels" : "ellipsoids",
-                     className(stored.descriptor.gridClass), std::move(*outline),
+                     className(stored.descriptor.gridClass), std::move(outline),
                      stored.field.ellipsoidCount(), cli::storedBytes(summary, i),
                      stored.activeVoxels});
   }
@@ -63,12 +54,12 @@ void showSequence(const render::SceneFile& from, ShownFile& file) {
   for (const SequenceFrame& frame : reader.frames()) {
     file.frames.push_back(frame.number);
     const EsvrSummary summary = reader.inspect(frame.number);
-    enclose(gridsOf(reader.read(frame.number), summary, from), file.grids);
+    enclose(gridsOf(reader.read(frame.number), summary), file.grids);
   }
 }
 
 /// Removes the voxels of a scene.
-std::vector<render::Scene> outlineOf(std::vector<render::Scene> scenes) {
+std::vector<render::Scene> withoutVoxels(std::vector<render::Scene> scenes) {
   for (render::Scene& scene : scenes) scene.content = VolumeGrid{}, scene.encoded.reset();
   return scenes;
 }
@@ -79,7 +70,7 @@ void showVdb(const render::SceneFile& from, ShownFile& file) {
     render::SceneFile of = from;
     of.grid = grid.uniqueName;
     file.grids.push_back({grid.uniqueName, "vdb", className(grid.gridClass),
-                          outlineOf(readScenes(of)), 0, grid.storedBytes, grid.activeVoxels});
+                          withoutVoxels(readScenes(of)), 0, grid.storedBytes, grid.activeVoxels});
   }
 }
 
@@ -92,12 +83,16 @@ const auto& at(const List& list, std::size_t index, const std::string& what) {
 }  // namespace
 
 ShownFile showFile(const fs::path& path, const cli::HostMemory& memory) {
+  if (cli::FramePattern::ofInput(path.string()))
+    throw BadInput(path.string() +
+                   " is a pattern for files of one frame each; esvr-view shows sequences that are "
+                   "in one file, which vdb2esvr writes if its output has no pattern");
   ShownFile file{path, 0, {}, {}};
   const render::SceneFile from{path, {}, {}, memory};
   if (cli::framesInFile(path))
     showSequence(from, file);
   else if (path.extension() == ".esvr")
-    file.grids = gridsOf(readEsvr(path, limitsOf(memory)), inspectEsvr(path), from);
+    file.grids = gridsOf(readEsvr(path, limitsOf(memory)), inspectEsvr(path));
   else
     showVdb(from, file);
   if (file.grids.empty()) throw BadInput(path.string() + ": no grid that can be drawn");

@@ -93,6 +93,7 @@ void Desk::drawPng(const std::shared_ptr<Outlet>& client, PictureRequest request
   studio_.add(client, [this, request = std::move(request)](Drawables& drawables, Outlet& to,
                                                            const CancelToken& gone) {
     try {
+      studio_.makeRoomFor(request);
       to.deliver(pngMessage(collection_, drawables, request, gone));
     } catch (const Cancelled&) {
       throw;

@@ -58,6 +58,7 @@ std::string exportedPage(std::string_view page, const std::string& name, std::st
 }
 
 void exportPage(const Export& what) {
+  cli::requireSeparate({what.input}, {what.output});
   cli::checkOutput(what.output, {".html"}, what.overwrite);
   checkInput(what);
   const std::string page =

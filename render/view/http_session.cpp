@@ -14,22 +14,23 @@ using boost::beast::error_code;
 
 }  // namespace
 
-HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& context,
-                         std::shared_ptr<void> seat)
-    : stream_(std::move(socket)),
-      context_(context),
-      seat_(std::move(seat)),
-      buffer_(context.socket.limits.headBytes) {
+HttpSession::HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& context)
+    : stream_(std::move(socket)), context_(context), buffer_(context.socket.limits.headBytes) {
   parser_.header_limit(std::uint32_t(context.socket.limits.headBytes));
   // No body is read, and judge() refuses requests with one.
   parser_.body_limit(std::numeric_limits<std::uint64_t>::max());
 }
 
 void HttpSession::run() {
-  stream_.expires_after(context_.socket.limits.requestTime);
+  stream_.expires_after(context_.socket.limits.guestTime);
   http::async_read_header(
       stream_, buffer_, parser_,
       [self = shared_from_this()](error_code error, std::size_t) { self->onHead(error); });
+}
+
+void HttpSession::drop() {
+  error_code ignored;
+  stream_.socket().close(ignored);  // what waits for the connection ends with an error
 }
 
 void HttpSession::onHead(error_code error) {
@@ -44,8 +45,11 @@ void HttpSession::onHead(error_code error) {
 
 void HttpSession::serve(const Request& request) {
   const Verdict verdict = judge(request, context_.site);
-  if (verdict.target == Target::kSocket) return openSocket(request);
   if (verdict.target == Target::kNothing) return send(statusResponse(verdict.status));
+  seat_ = context_.requests.take();
+  if (!seat_) return send(statusResponse(http::status::service_unavailable));
+  stream_.expires_after(context_.socket.limits.requestTime);
+  if (verdict.target == Target::kSocket) return openSocket(request);
   const auto host = request[http::field::host];
   send(pageResponse(context_.page, {host.data(), host.size()}));
 }

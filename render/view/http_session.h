@@ -21,14 +21,19 @@ struct HttpContext {
   std::string_view page;
   SocketContext socket;
   Seats clients;
+  Seats requests;
 };
 
-/// Reads one request, and answers it or hands the connection to a SocketSession.
+/// Reads one request, and answers it or hands the connection to a SocketSession. It is a guest until its
+/// request has the token.
 class HttpSession : public std::enable_shared_from_this<HttpSession> {
  public:
-  HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& context,
-              std::shared_ptr<void> seat);
+  HttpSession(boost::asio::ip::tcp::socket socket, HttpContext& context);
   void run();
+
+  [[nodiscard]] bool isGuest() const { return !seat_; }
+  /// Closes the connection.
+  void drop();
 
  private:
   void onHead(boost::beast::error_code error);
@@ -39,7 +44,7 @@ class HttpSession : public std::enable_shared_from_this<HttpSession> {
 
   boost::beast::tcp_stream stream_;
   HttpContext& context_;
-  const std::shared_ptr<void> seat_;
+  std::shared_ptr<void> seat_;  ///< null for a guest
   boost::beast::flat_buffer buffer_;
   http::request_parser<http::empty_body> parser_;
   Response response_;

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <system_error>
 
+#include "cli/host_memory.h"
 #include "esvr/error.h"
 #include "report/child_program.h"
 
@@ -33,8 +34,7 @@ fs::path openerPath() {
 /// Writes a file that only its owner can read. \return its path
 fs::path writePrivate(const std::string& text) {
   constexpr std::string_view kSuffix = ".html";
-  std::string name =
-      (fs::temp_directory_path() / "esvr-view-XXXXXX").string() + std::string(kSuffix);
+  std::string name = (cli::scratchFolder() / "esvr-view-XXXXXX").string() + std::string(kSuffix);
   report::Descriptor file(::mkstemps(name.data(), int(kSuffix.size())));
   if (file.get() < 0) fail(name, errno);
   if (::write(file.get(), text.data(), text.size()) != ssize_t(text.size())) fail(name, errno);

@@ -3,6 +3,7 @@
 #include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
+#include <cstdlib>
 #include <iostream>
 #include <optional>
 
@@ -62,6 +63,12 @@ void serve(const Options& options) {
   std::optional<OpenedPage> opened;
   if (options.open) opened.emplace(url);
   service.run();
+  // Nothing that is drawn, read or encoded has to be completed: the program has no files to write.
+  constexpr std::chrono::milliseconds kPatience{500};
+  if (service.endsWithin(kPatience)) return;
+  std::cout.flush();
+  opened.reset();  // removes its file
+  std::_Exit(0);
 }
 
 }  // namespace

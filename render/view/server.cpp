@@ -25,17 +25,16 @@ Server::Server(boost::asio::io_context& io, const tcp::endpoint& at, HttpContext
       pause_(io),
       endpoint_(acceptor_.local_endpoint()),
       context_(context),
-      connections_(context.socket.limits.connections) {}
+      guests_(context.socket.limits.guests) {}
 
 void Server::run() {
   acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
     if (error) return runLater();
-    // A connection without a seat is closed at once.
-    if (auto seat = connections_.take()) {
-      boost::system::error_code ignored;
-      socket.set_option(tcp::no_delay(true), ignored);
-      std::make_shared<HttpSession>(std::move(socket), context_, std::move(seat))->run();
-    }
+    boost::system::error_code ignored;
+    socket.set_option(tcp::no_delay(true), ignored);
+    const auto session = std::make_shared<HttpSession>(std::move(socket), context_);
+    guests_.admit(session);
+    session->run();
     run();
   });
 }

@@ -27,7 +27,7 @@ class Server {
   boost::asio::steady_timer pause_;
   boost::asio::ip::tcp::endpoint endpoint_;
   HttpContext& context_;
-  Seats connections_;
+  Guests<HttpSession> guests_;
 };
 
 }  // namespace esvr::view

@@ -24,12 +24,18 @@ Service::Service(const Collection& collection, const Settings& settings)
       context_{settings.site,
                viewPage(),
                {desk_, studio_, settings.limits},
-               Seats(settings.limits.clients)},
+               Seats(settings.limits.clients),
+               Seats(settings.limits.requests)},
       server_(io_, settings.at, context_) {
   server_.run();
 }
 
 // Connections may outlive this call in handlers of the context, but the studio no longer sends.
 Service::~Service() { studio_.stop(); }
+
+bool Service::endsWithin(std::chrono::milliseconds time) {
+  stop();
+  return studio_.endsWithin(time);
+}
 
 }  // namespace esvr::view

@@ -2,6 +2,7 @@
 /// The viewer's server as a whole.
 
 #include <boost/asio/io_context.hpp>
+#include <chrono>
 
 #include "render/view/desk.h"
 #include "render/view/server.h"
@@ -32,6 +33,9 @@ class Service {
   /// Serves until stop(), which any thread may call.
   void run() { io_.run(); }
   void stop() { io_.stop(); }
+  /// Stops, and cancels what is drawn. \return false if that goes on for longer than a time, for example
+  /// because a large file is being read
+  [[nodiscard]] bool endsWithin(std::chrono::milliseconds time);
 
  private:
   boost::asio::io_context io_;

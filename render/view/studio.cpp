@@ -7,6 +7,7 @@
 #include "cli/failure.h"
 #include "cli/stopwatch.h"
 #include "esvr/error.h"
+#include "esvr/memory_limit.h"
 #include "render/view/binary_message.h"
 #include "render/view/failed_message.h"
 #include "render/view/jpeg_file.h"
@@ -19,6 +20,14 @@ namespace {
 constexpr double kFirstBudget = 0.03;
 constexpr std::size_t kMostTasks = 8;  // that wait for one client
 constexpr double kMs = 1e3;            // milliseconds of a second
+
+/// Memory of a picture while it is drawn and encoded: the last pass, the picture that it is enlarged to,
+/// its copy and the encoded bytes. A comparison has a second picture of each.
+double bytesOf(const PictureRequest& picture) {
+  constexpr double kBytesPerPixel = 64.0;
+  const double pictures = picture.scene.compare ? 2.0 : 1.0;
+  return pictures * kBytesPerPixel * picture.size.width * picture.size.height;
+}
 
 }  // namespace
 
@@ -40,6 +49,7 @@ struct Studio::Job {
   Urgency urgency = urgencyOf(request);  ///< of the next pass; the mutex protects it
   std::optional<Painting> painting;
   int passes = 0;
+  bool inOnePass = false;  ///< it was given up to make room, and would be given up again
 };
 
 /// What a client waits for.
@@ -69,15 +79,28 @@ struct Studio::Work {
 };
 
 Studio::Studio(const Collection& collection, const render::DrawSettings& settings)
-    : collection_(collection), drawables_(collection, settings), thread_([this] { loop(); }) {}
+    : collection_(collection),
+      maxBytes_(settings.memory.maxBytes),
+      drawables_(collection, settings),
+      thread_([this] { loop(); }) {}
 
-void Studio::stop() {
+void Studio::cancelAll() {
   stopping_.cancel();
   {
     const std::scoped_lock lock(mutex_);
     stopped_ = true;
   }
-  changed_.notify_one();
+  changed_.notify_all();
+}
+
+bool Studio::endsWithin(std::chrono::milliseconds time) {
+  cancelAll();
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, time, [&] { return ended_; });
+}
+
+void Studio::stop() {
+  cancelAll();
   if (thread_.joinable()) thread_.join();
   easels_.clear();
 }
@@ -142,7 +165,11 @@ void Studio::loop() {
     {
       std::unique_lock lock(mutex_);
       changed_.wait(lock, [&] { return stopped_ || (work = next()); });
-      if (stopped_) return;
+      if (stopped_) {
+        ended_ = true;
+        changed_.notify_all();
+        return;
+      }
     }
     perform(*work);
     end(*work);
@@ -191,10 +218,14 @@ void Studio::perform(const Work& work) {
 void Studio::drawPass(Job& job, Outlet& outlet) {
   const auto& [picture, quality, moving] = job.request;
   cli::Stopwatch watch;
+  makeRoom(picture, &job);
   if (!job.painting)
     job.painting.emplace(
         Painting::Input{collection_, drawables_, picture.scene, picture.size, &*job.pass});
-  job.painting->refine(job.passes == 0 ? kFirstBudget : 0.0);
+  if (job.inOnePass)
+    job.painting->complete();
+  else
+    job.painting->refine(job.passes == 0 ? kFirstBudget : 0.0);
   ++job.passes;
   const double drawMs = kMs * watch.lap();
   const Image image = job.painting->picture();
@@ -220,6 +251,27 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
     }
   outlet.deliver(binaryMessage(head, jpeg));
   if (last) job.cancel.cancel();
+}
+
+/// Memory is needed for one picture that is being drawn, and for those that wait for their next pass. The
+/// picture of a pass is held together with its copy that is encoded.
+void Studio::makeRoom(const PictureRequest& picture, const Job* own) {
+  const double needed = bytesOf(picture);
+  requireWithinMemory(needed, maxBytes_,
+                      "a picture of " + std::to_string(picture.size.width) + " x " +
+                          std::to_string(picture.size.height) + " pixels");
+  const std::scoped_lock lock(mutex_);
+  double kept = 0.0;
+  // The pictures of the clients that wait longest are given up last, because it is their turn.
+  for (const auto& easel : easels_) {
+    Job* const job = easel->job.get();
+    if (job == nullptr || job == own || !job->painting) continue;
+    kept += bytesOf(job->request.picture);
+    if (kept + needed <= double(maxBytes_)) continue;
+    kept -= bytesOf(job->request.picture);
+    job->painting.reset();
+    job->inOnePass = true;
+  }
 }
 
 /// After a pass, forgets a job that has ended.

@@ -1,6 +1,7 @@
 #pragma once
 /// Draws the pictures of all clients on one thread.
 
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <functional>
@@ -46,6 +47,13 @@ class Studio {
   void wake();
   /// Cancels everything and forgets all clients.
   void stop();
+  /// Cancels everything. \return false if the thread goes on for longer than a time
+  [[nodiscard]] bool endsWithin(std::chrono::milliseconds time);
+  /// Checks the memory of a picture that is about to be drawn, and gives up pictures of other clients
+  /// that wait for their next pass, so that all of them together keep to the limit. Those are drawn anew,
+  /// in one pass. To be called by tasks.
+  /// \throws MemoryExceeded  the picture alone is too large
+  void makeRoomFor(const PictureRequest& picture) { makeRoom(picture, nullptr); }
 
  private:
   struct Job;
@@ -55,6 +63,8 @@ class Studio {
   [[nodiscard]] static Urgency urgencyOf(const DrawRequest& request);
   [[nodiscard]] Easel& easelOf(const std::shared_ptr<Outlet>& client);
   void loop();
+  void cancelAll();
+  void makeRoom(const PictureRequest& picture, const Job* own);
   [[nodiscard]] std::optional<Work> next();
   void perform(const Work& work);
   void drawPass(Job& job, Outlet& outlet);
@@ -62,12 +72,14 @@ class Studio {
   void end(const Work& work);
 
   const Collection& collection_;
-  Drawables drawables_;  ///< used by the thread only
+  const std::uint64_t maxBytes_;  ///< of pictures
+  Drawables drawables_;           ///< used by the thread only
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::shared_ptr<Easel>> easels_;  ///< the one that waits longest comes first
   std::shared_ptr<Job> drawn_;                  ///< the job of which a pass is drawn at this moment
   bool stopped_ = false;
+  bool ended_ = false;  ///< the thread has left its loop
   CancelToken stopping_;
   std::thread thread_;
 };

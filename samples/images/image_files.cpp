@@ -5,7 +5,7 @@
 #include <optional>
 #include <system_error>
 
-#include "cli/frame_pattern.h"
+#include "cli/sequence.h"
 #include "esvr/error.h"
 #include "images/image_format.h"
 
@@ -50,17 +50,13 @@ void requireEvenSteps(const cli::FramePattern& pattern,
                      " is missing");
 }
 
-std::vector<fs::path> filesOfPattern(const cli::FramePattern& pattern) {
-  const auto numbers = pattern.onDisk();
-  if (numbers.empty()) {
-    const auto other = pattern.withOtherDigits();
-    throw BadInput("no file matches " + pattern.text() +
-                   (other ? "; " + other->string() + " has another number of digits" : ""));
-  }
-  requireEvenSteps(pattern, numbers);
-  std::vector<fs::path> paths;
-  for (const cli::FrameNumber number : numbers) paths.push_back(pattern.at(number));
-  return paths;
+ImageFiles filesOfPattern(const cli::FramePattern& pattern) {
+  const cli::FrameListing listing = cli::framesOnDisk(pattern);
+  requireEvenSteps(pattern, listing.frames);
+  ImageFiles files{.paths = {}, .hint = listing.hint()};
+  for (const cli::FrameNumber number : listing.frames)
+    files.paths.push_back(pattern.toRead(number));
+  return files;
 }
 
 }  // namespace
@@ -90,9 +86,8 @@ ImageFiles imageFiles(const std::vector<std::string>& names) {
   std::error_code ignored;
   const fs::path path = names.front();
   if (fs::is_directory(path, ignored)) return {filesOfFolder(path)};
-  const auto pattern =
-      fs::exists(path, ignored) ? std::nullopt : cli::FramePattern::in(names.front());
-  return {pattern ? filesOfPattern(*pattern) : std::vector{path}};
+  const auto pattern = cli::FramePattern::ofInput(names.front());
+  return pattern ? filesOfPattern(*pattern) : ImageFiles{{path}};
 }
 
 }  // namespace esvr::samples

@@ -12,6 +12,7 @@ struct ImageFiles {
   std::vector<std::filesystem::path> paths;  ///< one, or the slices of a stack
   /// Whether they were named one by one in another order than that of the numbers in their names.
   bool outOfOrder = false;
+  std::string hint{};  ///< files that look like slices of a pattern and are none; may be empty
 };
 
 /// Finds the files of one of these:

@@ -107,6 +107,8 @@ int run(int argc, char** argv) {
     cli::requireRange("frame", frame, 1, int(paths.size()));
     first = last = std::size_t(frame) - 1;
   }
+  cli::requireSeparate(
+      {}, {paths.begin() + std::ptrdiff_t(first), paths.begin() + std::ptrdiff_t(last) + 1});
   for (std::size_t f = first; f <= last; ++f)
     cli::checkOutput(paths[f], {".vdb", ".nvdb"}, overwrite);
 

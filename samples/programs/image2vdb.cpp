@@ -196,6 +196,8 @@ int run(int argc, char** argv) {
   auto names = fileArguments(*arguments);
   const samples::Output output{names.back(), arguments->get<bool>("force")};
   names.pop_back();
+  cli::requireSeparate({names.begin(), names.end()}, {output.path});
+  const cli::WatchedInputs watched({names.begin(), names.end()});
   cli::checkOutput(output.path, {".vdb", ".nvdb"}, output.overwrite);
   const samples::ImageFiles files = samples::imageFiles(names);
   const auto image = samples::openImage(requestFrom(*arguments, files));
@@ -205,6 +207,7 @@ int run(int argc, char** argv) {
   if (files.outOfOrder)
     log.warning(
         "the slices are in the order given, which is not that of the numbers in their names");
+  if (!files.hint.empty()) log.warning(files.hint);
   const cli::ThreadLimit threads(arguments->threads);
   const cli::Interrupts interrupts;
   samples::ImageVolume made = volumeOf(
@@ -213,6 +216,7 @@ int run(int argc, char** argv) {
     log.warning(std::to_string(made.nonFiniteReplaced) + " voxels were not finite and are now 0");
   const std::vector<VolumeGrid> grids{
       samples::densityGrid(std::move(made.volume), transform, arguments->get<std::string>("name"))};
+  watched.requireUnchanged();
   samples::writeOutput(output, std::vector{stringItem("creator", kName)}, grids, log);
   return 0;
 }

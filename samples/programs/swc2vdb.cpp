@@ -3,10 +3,12 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "cli/command_line.h"
+#include "cli/input_files.h"
 #include "cli/interrupts.h"
 #include "cli/output.h"
 #include "cli/run_main.h"
@@ -104,10 +106,13 @@ int run(int argc, char** argv) {
   const Options options = optionsFrom(*arguments);
   const samples::Output output{arguments->get<std::string>("output"),
                                arguments->get<bool>("force")};
+  const std::string input = arguments->get<std::string>("input");
+  cli::requireSeparate({input}, {output.path});
   cli::checkOutput(output.path, {".vdb", ".nvdb"}, output.overwrite);
   const cli::Log log(kName, arguments->verbosity);
 
-  samples::Skeleton skeleton = samples::readSwc(arguments->get<std::string>("input"));
+  std::istringstream text(cli::readText(input));
+  samples::Skeleton skeleton = samples::parseSwc(text, input);
   if (options.longest) skeleton = samples::longestPieces(skeleton, std::size_t(*options.longest));
   log.detail(std::to_string(skeleton.size()) + " nodes");
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 
 namespace esvr::samples {
 
@@ -10,7 +11,7 @@ void writeOutput(const Output& output, std::span<const MetaItem> metadata,
                  std::span<const VolumeGrid> grids, const cli::Log& log) {
   for (const VolumeGrid& grid : grids)
     if (grid.volume.brickCount() == 0)
-      throw BadInput("grid '" + grid.descriptor.name +
+      throw BadInput("grid '" + shownName(grid.descriptor.name) +
                      "' has no active voxel; nothing was written");
   writeGrids(output.path, metadata, grids, {.overwrite = output.overwrite});
   for (const VolumeGrid& grid : grids) {

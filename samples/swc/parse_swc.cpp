@@ -1,11 +1,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <sstream>
 #include <string_view>
-#include <system_error>
 #include <unordered_map>
 
 #include "esvr/error.h"
@@ -117,16 +115,6 @@ class SwcParser {
 
 Skeleton parseSwc(std::istream& text, const std::string& name) {
   return SwcParser(name).parse(text);
-}
-
-Skeleton readSwc(const std::filesystem::path& path) {
-  std::error_code unreadable;
-  if (std::filesystem::is_directory(path, unreadable))
-    throw BadInput("cannot read " + path.string() + ": it is a directory");
-  std::ifstream file(path);
-  if (!file)
-    throw BadInput("cannot read " + path.string() + ": " + std::generic_category().message(errno));
-  return parseSwc(file, path.string());
 }
 
 }  // namespace esvr::samples

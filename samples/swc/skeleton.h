@@ -24,12 +24,9 @@ struct SkeletonNode {
 using Skeleton = std::vector<SkeletonNode>;
 
 /// Reads a skeleton.
-/// \throws BadInput  the file is missing, not readable or without nodes; a line is not a node (the
-///                   text gives its number); an id is defined twice; a parent does not exist or is
-///                   the node itself
-[[nodiscard]] Skeleton readSwc(const std::filesystem::path& path);
-
 /// \param name  name of the source for messages
+/// \throws BadInput  there is no node; a line is not a node (the text gives its number); an id is
+///                   defined twice; a parent does not exist or is the node itself
 [[nodiscard]] Skeleton parseSwc(std::istream& text, const std::string& name);
 
 /// Makes a round cone from every node to its parent, and a ball for each node without links, in the

@@ -124,8 +124,11 @@ static void sums_at_voxels_are_their_values(const char* name) {
     }
     EXPECT(esvr_evaluate(file, 0, ESVR_BRICK_VOXELS, places, values) == ESVR_OK);
     for (int v = 0; v < ESVR_BRICK_VOXELS; ++v)
-      if (brick.active[v / 64] >> (v % 64) & 1)
-        EXPECT(fabs((double)values[v] - (double)brick.values[v]) <= tolerance);
+      if (brick.active[v / 64] >> (v % 64) & 1) {
+        /* The source was saved as half, to which decoded voxels are rounded and sums are not. */
+        const double half = fabs((double)values[v]) * 0x1p-11 + 0x1p-25;
+        EXPECT(fabs((double)values[v] - (double)brick.values[v]) <= tolerance + half);
+      }
   }
   free(all);
   esvr_free_volume(volume);

@@ -29,5 +29,28 @@ TEST(ByteSize, refusesTextThatIsNoSize) {
         << text;
 }
 
+TEST(DeviceMemory, hasTheUnitsOfOtherSizes) {
+  EXPECT_EQ(parseDeviceMemory("max-vram", "64MB"), 64'000'000u);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "1.5GiB"), std::uint64_t{3} << 29);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "64000000"), 64'000'000u);
+}
+
+TEST(DeviceMemory, isOfGigabytesWithoutAUnitIfThatIsTheOnlyMeaning) {
+  EXPECT_EQ(parseDeviceMemory("max-vram", "4"), 4'000'000'000u);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "0.003"), 3'000'000u);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "1000000"), 1'000'000u);
+}
+
+TEST(DeviceMemory, refusesWhatIsNoMemoryOrTooLittle) {
+  for (const char* text : {"", "x", "-4", "0", "4XB", "nan", "1e300"})
+    EXPECT_THAT([&] { (void)parseDeviceMemory("max-vram", text); },
+                ThrowsMessage<UsageError>(HasSubstr("--max-vram must be a size")))
+        << text;
+  for (const char* text : {"999KB", "0.0001"})
+    EXPECT_THAT([&] { (void)parseDeviceMemory("max-vram", text); },
+                ThrowsMessage<UsageError>(HasSubstr("at least 1MB")))
+        << text;
+}
+
 }  // namespace
 }  // namespace esvr::cli

@@ -60,7 +60,8 @@ class CompareCheck : public test::FolderTest {
 };
 
 TEST_F(CompareCheck, refusesWhatTakesMoreMemoryThanAllowed) {
-  EXPECT_EQ(check("ref.vdb", {"--max-memory", "100B"}).exitCode, 5);
+  write("drifted.vdb", {drifted()});
+  EXPECT_EQ(check("drifted.vdb", {"-g", "density", "--max-memory", "100B"}).exitCode, 5);
 }
 
 TEST_F(CompareCheck, findsNoErrorInTheFileItself) {
@@ -222,6 +223,56 @@ TEST_F(CompareCheck, failsWhereTheCandidateIsEmpty) {
   EXPECT_THAT(run.err, HasSubstr("the candidate has no active voxel"));
 }
 
+TEST_F(CompareCheck, comparesZerosWithAPeakOfOne) {
+  const std::vector<test::InputVoxel> zeros{{{0, 0, 0}, 0.0f}, {{1, 0, 0}, 0.0f}};
+  write("ref.vdb", {ball(), {.name = "flame", .voxels = zeros}});
+  EXPECT_EQ(check("ref.vdb", {"--max-error", "0"}).exitCode, 0);
+  ASSERT_EQ(test::quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
+  EXPECT_EQ(check("fit.esvr", {"-g", "flame", "--max-error", "0"}).exitCode, 0);
+  write("off.vdb", {ball(), {.name = "flame", .voxels = {{{0, 0, 0}, 0.1f}, {{1, 0, 0}, 0.1f}}}});
+  const auto report = reportOf("off.vdb", {"-g", "flame"});
+  EXPECT_NEAR(report["grids"][0]["psnr_active"].get<double>(), 20.0, 1e-5);
+}
+
+TEST_F(CompareCheck, comparesGridsThatAreNotFiniteByTheirBytes) {
+  const auto odd = [](float value) {
+    return InputGrid{.name = "odd", .voxels = {{{1, 2, 3}, value}, {{1 << 30, 0, 0}, 1.0f}}};
+  };
+  const float nan = std::nanf("");
+  write("ref.vdb", {odd(nan), {.name = "far", .voxels = softBall({}), .background = nan}, ball()});
+  const auto same = check("ref.vdb", {"--max-error", "0"});
+  EXPECT_EQ(same.exitCode, 0) << same.err;
+  ASSERT_EQ(test::vdb2esvr(
+                {at("ref.vdb"), at("f.esvr"), "--keep", "odd", "--keep", "far", "-g", "density"})
+                .exitCode,
+            0);
+  const auto carried = check("f.esvr", {"--min-psnr-active", "30"});
+  EXPECT_EQ(carried.exitCode, 0) << carried.err;
+  EXPECT_THAT(carried.out, AllOf(HasSubstr("grid \"odd\": the same bytes (float)"),
+                                 HasSubstr("grid \"far\": the same bytes (float)")));
+
+  write("other.vdb",
+        {odd(2.0f), {.name = "far", .voxels = softBall({}), .background = nan}, ball()});
+  const auto run = check("other.vdb");
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, HasSubstr("grid \"odd\" cannot be compared: "));
+  EXPECT_THAT(run.out, HasSubstr("density")) << "the others are compared";
+  EXPECT_EQ(check("other.vdb", {"--max-bytes", "1"}).exitCode, 4);
+}
+
+TEST_F(CompareCheck, measuresOffsetValuesByTheirRange) {
+  const auto pressure = [](float error) {
+    InputGrid grid{.voxels = softBall({}, 40.0f, 101325.0f)};
+    for (auto& voxel : grid.voxels) voxel.value += error;
+    return grid;
+  };
+  write("ref.vdb", {pressure(0.0f)});
+  write("off.vdb", {pressure(4.0f)});
+  const auto report = reportOf("off.vdb");
+  EXPECT_NEAR(report["grids"][0]["peak"].get<double>(), 40.0, 2.0);
+  EXPECT_NEAR(report["grids"][0]["psnr_active"].get<double>(), 20.0, 0.5);
+}
+
 TEST_F(CompareCheck, holdsARunAgainstItsBaseline) {
   const std::vector<std::string> baseline{"--baseline", at("base.json")};
   write("off.vdb", {drifted(), heat()});
@@ -309,8 +360,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"DIR/none.vdb", "DIR/none.vdb", "--ignore-grids", "density"},
                 3,
                 "no grid can be compared"},
-        Refusal{{"DIR/none.vdb", "DIR/ref.vdb", "-g", "density"}, 3, "no active voxel"},
-        Refusal{{"DIR/zero.vdb", "DIR/zero.vdb"}, 3, "--peak"},
+        Refusal{{"DIR/none.vdb", "DIR/ref.vdb", "-g", "density"}, 4, "the reference has none"},
         Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--baseline", "DIR/no.json"}, 3, "no.json"},
         Refusal{{"DIR/ref.vdb", "DIR/ref.vdb", "--baseline", "DIR/notes.json"}, 3, "baseline"}));
 
@@ -321,6 +371,37 @@ TEST(CompareProgram, namesItsCommands) {
   EXPECT_EQ(test::runProgram(ESVR_COMPARE, {}).exitCode, 2);
   EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"--help"}).exitCode, 0);
   EXPECT_THAT(test::runProgram(ESVR_COMPARE, {"check", "--help"}).out, HasSubstr("--min-psnr"));
+}
+
+TEST_F(CompareCheck, refusesABaselineThatChecksNothing) {
+  ASSERT_EQ(check("ref.vdb", {"--baseline", at("base.json"), "--update"}).exitCode, 0);
+  const auto good = json::parse(test::readText(at("base.json")));
+  const auto expectRefused = [&](const json& baseline, const char* words) {
+    test::writeText(at("bad.json"), baseline.dump());
+    const auto run = check("ref.vdb", {"--baseline", at("bad.json")});
+    EXPECT_EQ(run.exitCode, 3) << baseline;
+    EXPECT_THAT(run.err, AllOf(HasSubstr("bad.json"), HasSubstr(words)));
+  };
+  for (const json& value : {json(5), json(), json(-1), json("density"), json::array()}) {
+    auto bad = good;
+    bad["grids"]["density"] = value;
+    expectRefused(bad, "is no object with figures");
+    bad = good;
+    bad["grids"]["density"]["iou"] = value;
+    expectRefused(bad, "is no object with a value and a tolerance");
+    bad = good;
+    bad["bytes"] = value;
+    expectRefused(bad, "bytes is no object");
+  }
+  auto misspelt = good;
+  misspelt["grids"]["density"]["max_eror"] = good["grids"]["density"]["max_error"];
+  expectRefused(misspelt, "which is no figure");
+  for (const json& tolerance : {json(), json(-1.0), json("1")}) {
+    auto bad = good;
+    bad["grids"]["density"]["max_error"]["tolerance"] = tolerance;
+    expectRefused(bad, "tolerance");
+  }
+  EXPECT_EQ(check("ref.vdb", {"--baseline", at("base.json")}).exitCode, 0);
 }
 
 }  // namespace

@@ -6,8 +6,14 @@
 
 #include <filesystem>
 
+#include "vdb/scalar_trees.h"
+
+#include <openvdb/io/File.h>
+
 #include "cli/converters.h"
+#include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
+#include "esvr/voxel_layer.h"
 #include "vdb/carried_bytes.h"
 
 namespace esvr {
@@ -82,6 +88,66 @@ TEST_F(EdgeFile, RealFileOfAMillionVectorsIsFittedWhereEllipsoidsAreAskedFor) {
   EXPECT_TRUE(back().grids.at(0).isVector);
 }
 
+/// Converts a file of edge/faults or edge/faults2 there and back.
+class FaultFile : public EdgeFile {
+ protected:
+  test::ProgramRun throughTheFile(const std::string& name,
+                                  std::vector<std::string> options = {}) const {
+    options.insert(options.begin(), {path(name), folder_ / "out.esvr", "--force"});
+    const auto run = test::vdb2esvr(options);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    const auto decode = test::esvr2vdb({folder_ / "out.esvr", folder_ / "back.vdb", "--force"});
+    EXPECT_EQ(decode.exitCode, 0) << decode.err;
+    return run;
+  }
+  [[nodiscard]] VolumeGrid read(const std::string& file) const {
+    return readGrid(file, inspectVdb(file).grids.at(0).uniqueName);
+  }
+  [[nodiscard]] VolumeGrid readBack() const { return read(folder_ / "back.vdb"); }
+};
+
+TEST_F(FaultFile, RealFileOfALevelSetWithAnotherInsideIsKeptByLossless) {
+  const auto run = throughTheFile("faults/levelset_inside_minus2.vdb", {"--lossless"});
+  EXPECT_THAT(run.out, HasSubstr("2109 inactive values (-2"));
+  EXPECT_EQ(readBack().inactive, read(path("faults/levelset_inside_minus2.vdb")).inactive);
+}
+
+TEST_F(FaultFile, RealFileOfTwoInactiveValuesIsKeptByLosslessAndToldOtherwise) {
+  throughTheFile("faults/inactive_values.vdb", {"--lossless"});
+  EXPECT_EQ(readBack().inactive.count(), 2u);
+  EXPECT_THAT(throughTheFile("faults/inactive_values.vdb").out,
+              HasSubstr("gives up 2 inactive values (5, first at"));
+}
+
+TEST_F(FaultFile, RealFileOfHalfsKeepsItsBound) {
+  throughTheFile("faults/half.vdb", {"--max-error", "0.0003"});
+  EXPECT_LE(largestDifference(read(path("faults/half.vdb")).volume, readBack().volume), 0.0003);
+}
+
+TEST_F(FaultFile, RealFileOfTheLargestHalfsComesBack) {
+  throughTheFile("faults2/half_maximum.vdb");
+  EXPECT_LE(activeRange(readBack().volume).max, 65504.0f);
+}
+
+TEST_F(FaultFile, RealFileOfAGiantTileIsRefusedOrCarried) {
+  const auto run =
+      test::vdb2esvr({path("faults/root_tile.vdb"), folder_ / "out.esvr", "--max-memory", "8GB"});
+  EXPECT_EQ(run.exitCode, 5);
+  EXPECT_THAT(run.err, HasSubstr("--keep"));
+  throughTheFile("faults/root_tile.vdb",
+                 {"--keep", inspectVdb(path("faults/root_tile.vdb")).grids.at(0).uniqueName});
+}
+
+TEST_F(FaultFile, RealFileOfConstantLeavesKeepsThemForBlender) {
+  throughTheFile("faults2/dense_leaves.vdb");
+  openvdb::initialize();
+  openvdb::io::File file(folder_ / "back.vdb");
+  file.open();
+  const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
+  EXPECT_EQ(grid->tree().leafCount(), 8u);
+  EXPECT_EQ(grid->activeVoxelCount(), 8u * kBrickVoxels);
+}
+
 TEST_F(EdgeFile, RealFileOfPointsIsCarried) { expectCarried("points_only.vdb"); }
 
 TEST_F(EdgeFile, RealFileWithATypeThatOpenVdbCannotReadGivesAllItsGrids) {
@@ -92,6 +158,59 @@ TEST_F(EdgeFile, RealFileWithATypeThatOpenVdbCannotReadGivesAllItsGrids) {
   EXPECT_THAT(namesOf(back()), ElementsAre("velocity", "phi_obstacle", "phi_inflow", "phi_out",
                                            "flags", "velocity_previous", "particles",
                                            "phi_particles", "phi", "phi_previous"));
+}
+
+/// Converts a file there and back, with the default goal and given options.
+class ComparedFaultFile : public EdgeFile {
+ protected:
+  [[nodiscard]] std::string source(const std::string& name) const { return path("faults/" + name); }
+  void convertThereAndBack(const std::string& name, std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {source(name), folder_ / "out.esvr", "--force"});
+    const auto there = test::vdb2esvr(more);
+    ASSERT_EQ(there.exitCode, 0) << there.err;
+    const auto run = test::esvr2vdb({folder_ / "out.esvr", folder_ / "back.vdb", "--force"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+  [[nodiscard]] test::ProgramRun check(const std::string& name, const std::string& candidate,
+                                       std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {"check", source(name), folder_ / candidate});
+    return test::runProgram(ESVR_COMPARE, more);
+  }
+};
+
+TEST_F(ComparedFaultFile, RealFileOfAnOffsetPressureHasTheQualityOfItsRange) {
+  for (const std::vector<std::string>& options :
+       {std::vector<std::string>{}, {"--representation", "ellipsoids", "--count", "300"}}) {
+    convertThereAndBack("pressure_offset.vdb", options);
+    const VolumeGrid a = readGrid(source("pressure_offset.vdb"), "p");
+    const VolumeGrid b = readGrid(folder_ / "back.vdb", "p");
+    EXPECT_LT(peakOf(a.volume), 41.0);
+    const VolumeMetrics m = compareVolumes(a.volume, b.volume);
+    EXPECT_GE(m.psnrActive, options.empty() ? 40.0 : 20.0);
+    EXPECT_GT(m.iou, 0.95);
+    EXPECT_GE(activeRange(b.volume).min, a.volume.background - 1.0f);
+    EXPECT_EQ(b.volume.background, a.volume.background);
+  }
+}
+
+TEST_F(ComparedFaultFile, RealFileOfVectorsKeepsAPercentageForTheCheckToo) {
+  convertThereAndBack("vector.vdb", {"--max-error", "1%"});
+  for (const char* candidate : {"out.esvr", "back.vdb"}) {
+    const auto run = check("vector.vdb", candidate, {"--max-error", "1%"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+  }
+}
+
+TEST_F(ComparedFaultFile, RealFileWithAGridOfZerosIsComparedWithItself) {
+  const std::string zeros = source("all_zero_flame.vdb");
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"check", zeros, zeros}).exitCode, 0);
+  convertThereAndBack("all_zero_flame.vdb");
+  EXPECT_EQ(check("all_zero_flame.vdb", "back.vdb").exitCode, 0);
+}
+
+TEST_F(ComparedFaultFile, RealFileOfARootTileIsComparedByItsBytes) {
+  const std::string tile = source("root_tile.vdb");
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"check", tile, tile}).exitCode, 0);
 }
 
 }  // namespace

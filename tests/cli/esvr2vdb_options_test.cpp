@@ -33,6 +33,12 @@ class Esvr2VdbOption : public test::FolderTest {
 };
 
 TEST_F(Esvr2VdbOption, noTilesWritesLeaves) {
+  constexpr int kSide = 72;  // small grids keep their leaves for Blender
+  std::vector<test::InputVoxel> cube;
+  for (int v = 0; v < kSide * kSide * kSide; ++v)
+    cube.push_back({{v / (kSide * kSide), v / kSide % kSide, v % kSide}, 1.0f});
+  test::writeInput(at("in.vdb"), {{.voxels = cube}});
+  ASSERT_EQ(test::vdb2esvr({at("in.vdb"), at("in.esvr"), "--lossless", "--force"}).exitCode, 0);
   (void)decode("tiles.vdb", {});
   (void)decode("leaves.vdb", {"--no-tiles"});
   EXPECT_GT(sizeOf("leaves.vdb"), sizeOf("tiles.vdb"));

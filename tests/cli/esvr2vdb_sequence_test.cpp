@@ -67,8 +67,8 @@ TEST_F(SequenceBack, holdsOrSkipsMissingFrames) {
   EXPECT_EQ(back({"--frames", "2-4"}).exitCode, 3);
   ASSERT_EQ(back({"--frames", "2-4", "--missing", "skip"}).exitCode, 0);
   EXPECT_THAT(outputs(), ElementsAre("out.02.vdb", "out.03.vdb"));
-  ASSERT_EQ(back({"--frames", "2-4", "--missing", "hold"}, "held##/a.vdb").exitCode, 0);
-  EXPECT_EQ(voxelsOf("held04/a.vdb").values, voxelsOf("out.03.vdb").values);
+  ASSERT_EQ(back({"--frames", "2-4", "--missing", "hold"}, "held.##.vdb").exitCode, 0);
+  EXPECT_EQ(voxelsOf("held.04.vdb").values, voxelsOf("out.03.vdb").values);
 }
 
 TEST_F(SequenceBack, namesDamagedFramesAndStopsWhereAsked) {

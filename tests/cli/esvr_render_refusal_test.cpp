@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <filesystem>
 
 #include "cli/esvr_render_fixture.h"
 
@@ -73,6 +76,32 @@ TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
   EXPECT_EQ(large.exitCode, 5);
   EXPECT_THAT(large.err, AllOf(HasSubstr("30000 x 30000"), HasSubstr("43.2 GB")));
   EXPECT_EQ(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}).exitCode, 2);
+}
+
+TEST_F(EsvrRender, TwoOutputsAreNeverOneFile) {
+  const std::vector<std::string> reference{"--ref", folder_ / "in.vdb"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), reference.begin(), reference.end());
+    return more;
+  };
+  expectRefused(with({"--sheet", folder_ / "refused.png"}), 2, "are one file");
+  expectRefused(with({"--sheet", folder_ / "refused.error.png"}), 2, "are one file");
+  std::filesystem::create_symlink(folder_ / "in.vdb", folder_ / "link.png");
+  expectRefused(with({"--sheet", folder_ / "link.png", "--force"}), 2, "are one file");
+}
+
+TEST_F(EsvrRender, APipeWithoutAWriterIsRefusedSlow) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  expectRefused({"--camera", folder_ / "pipe"}, 3, "no program writes to it");
+  expectRefused({"--tf", folder_ / "pipe"}, 3, "no program writes to it");
+}
+
+TEST_F(EsvrRender, ACameraMayComeThroughAPipe) {
+  const auto run = runProgram(
+      "/bin/bash", {"-c", std::string(ESVR_RENDER) + " - " + (folder_ / "out.png").string() +
+                              " --resolution 16x16 --camera <(echo '{\"eye\": [1, 2, 90]}') < " +
+                              (folder_ / "in.esvr").string()});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST_F(EsvrRenderTurn, AnInterruptedVideoLeavesNothing) {
   const auto run = runInterrupted(ESVR_RENDER, {folder_ / "in.esvr", folder_ / "turn.mp4",
                                                 "--turntable", "9999", "--resolution", "64x48"});
   EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, HasSubstr("cancelled"));
+  EXPECT_THAT(run.err, HasSubstr("interrupted; nothing was written"));
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb"));
 }
 

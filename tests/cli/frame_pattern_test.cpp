@@ -13,6 +13,7 @@ namespace esvr::cli {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 std::string pathOf(const std::string& pattern, FrameNumber frame) {
@@ -45,14 +46,15 @@ INSTANTIATE_TEST_SUITE_P(Numbers, FrameName,
                          testing::Values(Name{"a####", 0, "a0000"}, Name{"a####", -5, "a-005"},
                                          Name{"a@", -5, "a-5"}, Name{"a####", 12345, "a12345"},
                                          Name{"a####", -12345, "a-12345"}));
-INSTANTIATE_TEST_SUITE_P(
-    Places, FrameName,
-    testing::Values(Name{"####", 7, "0007"}, Name{"b/####/a.vdb", 7, "b/0007/a.vdb"},
-                    Name{"take#2/me@home/a.##.vdb", 7, "take#2/me@home/a.07.vdb"},
-                    Name{"a.####", 7, "a.0007"}));
+INSTANTIATE_TEST_SUITE_P(Places, FrameName,
+                         testing::Values(Name{"####", 7, "0007"},
+                                         Name{"take#2/me@home/a.##.vdb", 7,
+                                              "take#2/me@home/a.07.vdb"},
+                                         Name{"a.####", 7, "a.0007"}));
 
 TEST(FramePattern, IsNoneInOtherNames) {
-  for (const char* name : {"smoke.vdb", "smoke.0007.vdb", "100%.vdb", "$G4.vdb", "F4.vdb", ""})
+  for (const char* name : {"smoke.vdb", "smoke.0007.vdb", "100%.vdb", "$G4.vdb", "F4.vdb",
+                           "f.####/a.vdb", "100%d/a.vdb", ""})
     EXPECT_FALSE(FramePattern::in(name)) << name;
 }
 
@@ -73,7 +75,7 @@ class FramesOnDisk : public test::FolderTest {
 TEST_F(FramesOnDisk, AreInOrderOfTheirNumbers) {
   for (const char* name : {"a.0010.vdb", "a.0002.vdb", "a.-001.vdb", "a.12345.vdb", "a.0000.vdb"})
     write(name);
-  EXPECT_THAT(pattern("a.####.vdb").onDisk(), ElementsAre(-1, 0, 2, 10, 12345));
+  EXPECT_THAT(pattern("a.####.vdb").onDisk().frames, ElementsAre(-1, 0, 2, 10, 12345));
 }
 
 TEST_F(FramesOnDisk, HaveNamesThatThePatternGives) {
@@ -81,26 +83,80 @@ TEST_F(FramesOnDisk, HaveNamesThatThePatternGives) {
                            "aa.0005.vdb", "a.0x06.vdb", "a..vdb", "a.+007.vdb", "a.-000.vdb",
                            "a.99999999999999999999.vdb", "a.-9223372036854775808.vdb"})
     write(name);
-  EXPECT_THAT(pattern("a.####.vdb").onDisk(), ElementsAre(1));
-  EXPECT_THAT(pattern("a.@.vdb").onDisk(), ElementsAre(1));
-  EXPECT_THAT(pattern("a.@@@@@.vdb").onDisk(), ElementsAre(-3, 2));
-  EXPECT_THAT(pattern("b.#.vdb").onDisk(), IsEmpty());
-  EXPECT_THAT(pattern("no/folder/a.#.vdb").onDisk(), IsEmpty());
+  EXPECT_THAT(pattern("a.####.vdb").onDisk().frames, ElementsAre(-3, 1)) << "-3 as Blender has it";
+  EXPECT_THAT(pattern("a.@.vdb").onDisk().frames, ElementsAre(1));
+  EXPECT_THAT(pattern("a.@@@@@.vdb").onDisk().frames, ElementsAre(-3, 2));
+  EXPECT_THAT(pattern("b.#.vdb").onDisk().frames, IsEmpty());
+  EXPECT_THAT(pattern("no/folder/a.#.vdb").onDisk().frames, IsEmpty());
 }
 
 TEST_F(FramesOnDisk, MayBeInFoldersOfTheirOwn) {
   std::filesystem::create_directories(at("f01"));
   std::filesystem::create_directories(at("f02"));
   write("f02/a.vdb");
-  EXPECT_THAT(pattern("f##/a.vdb").onDisk(), ElementsAre(2)) << "f01 has no file";
-  EXPECT_EQ(pattern("f##/a.vdb").at(2), at("f02/a.vdb"));
+  const auto pattern = FramePattern::ofInput(at("f##/a.vdb"));
+  ASSERT_TRUE(pattern);
+  EXPECT_THAT(pattern->onDisk().frames, ElementsAre(2)) << "f01 has no file";
+  EXPECT_EQ(pattern->at(2), at("f02/a.vdb"));
 }
 
-TEST_F(FramesOnDisk, WithOtherDigitsAreFound) {
-  EXPECT_FALSE(pattern("a.#.vdb").withOtherDigits());
-  write("a.0001.vdb");
-  EXPECT_FALSE(pattern("a.#.vdb").withOtherDigits());
-  EXPECT_EQ(pattern("a.@@.vdb").withOtherDigits(), at("a.0001.vdb"));
+TEST_F(FramesOnDisk, AreNotThoseOfAFolderThatExists) {
+  for (const char* folder : {"render@farm", "Take #2", "C#", "100%d", "$F"}) {
+    std::filesystem::create_directories(at(folder));
+    const std::string path = at(folder) + "/a";
+    EXPECT_FALSE(FramePattern::ofInput(path + ".vdb")) << folder;
+    EXPECT_EQ(FramePattern::ofInput(path + ".##.vdb")->at(7), path + ".07.vdb");
+    EXPECT_EQ(FramePattern::ofInput(path + "##/b.vdb")->at(7), path + "07/b.vdb");
+  }
+  std::filesystem::create_directories(at("f##/C#"));
+  EXPECT_FALSE(FramePattern::ofInput(at("f##/C#/a.vdb")));
+}
+
+TEST_F(FramesOnDisk, AreNotThoseOfAFileThatExists) {
+  write("take#2.vdb");
+  EXPECT_FALSE(FramePattern::ofInput(at("take#2.vdb")));
+  EXPECT_TRUE(FramePattern::ofInput(at("take#3.vdb")));
+}
+
+TEST_F(FramesOnDisk, WithOtherDigitsAreTold) {
+  EXPECT_EQ(pattern("a.#.vdb").onDisk().hint(), "");
+  for (const char* name : {"a.1.vdb", "a.2.vdb", "a.9.vdb", "a.10.vdb", "a.11.vdb"}) write(name);
+  const FrameListing listing = pattern("a.##.vdb").onDisk();
+  EXPECT_THAT(listing.frames, ElementsAre(10, 11));
+  EXPECT_THAT(listing.others, ElementsAre(1, 2, 9));
+  EXPECT_EQ(listing.exampleOfOthers, at("a.1.vdb"));
+  EXPECT_EQ(listing.patternOfAll, at("a.@.vdb"));
+  EXPECT_THAT(listing.hint(), HasSubstr("1-2, 9 look like frames and are none"));
+  const std::vector<FrameNumber> wanted{9, 10};
+  EXPECT_THAT(listing.hint(&wanted), HasSubstr("9 looks like a frame and is none"));
+  const std::vector<FrameNumber> complete{10, 11};
+  EXPECT_EQ(listing.hint(&complete), "");
+  write("a.0012.vdb");
+  EXPECT_EQ(pattern("a.##.vdb").onDisk().patternOfAll, "") << "no pattern takes 1 and 0012";
+}
+
+TEST_F(FramesOnDisk, HaveTheFormOfBlenderWhereTheOtherIsAbsent) {
+  for (const char* name : {"a_-0002.vdb", "a_-0001.vdb", "a_-001.vdb", "a_0000.vdb"}) write(name);
+  const FramePattern blender = pattern("a_####.vdb");
+  const FrameListing listing = blender.onDisk();
+  EXPECT_THAT(listing.frames, ElementsAre(-2, -1, 0));
+  EXPECT_THAT(listing.others, ElementsAre(-1)) << "a_-0001.vdb, beside a_-001.vdb";
+  EXPECT_EQ(blender.toRead(-2), at("a_-0002.vdb"));
+  EXPECT_EQ(blender.toRead(-1), at("a_-001.vdb"));
+  EXPECT_EQ(blender.toRead(-3), at("a_-003.vdb"));
+  EXPECT_EQ(blender.at(-2), at("a_-002.vdb")) << "as outputs are written";
+}
+
+TEST_F(FramesOnDisk, AreNoSubstepsAndHaveNoHugeNumbers) {
+  for (const char* name : {"a.1001.vdb", "a.1001.50.vdb", "a.1002.50.vdb"}) write(name);
+  const FrameListing listing = pattern("a.####.vdb").onDisk();
+  EXPECT_THAT(listing.frames, ElementsAre(1001));
+  EXPECT_EQ(listing.substeps, 2u);
+  EXPECT_EQ(listing.patternOfSubsteps, at("a.####.50.vdb"));
+  EXPECT_THAT(listing.hint(), HasSubstr("a.1001.50.vdb and 1 more look like a substep of Houdini"));
+  EXPECT_THAT(pattern("a.####.50.vdb").onDisk().frames, ElementsAre(1001, 1002));
+  write("b.1.vdb"), write("b.99999999999999999999.vdb");
+  EXPECT_THAT(pattern("b.@.vdb").onDisk().hint(), HasSubstr("too large for a frame"));
 }
 
 }  // namespace

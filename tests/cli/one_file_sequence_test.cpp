@@ -253,7 +253,11 @@ TEST_F(OneFile, isReplacedWhereForcedOnly) {
   EXPECT_EQ(refused.exitCode, 1);
   EXPECT_THAT(refused.err, HasSubstr("exists already"));
   EXPECT_EQ(bytesOf("out.esvr"), "mine");
-  test::writeText(at("out.esvr.partial"), "left");
+  test::writeText(at("out.esvr.partial"), "a file of somebody else");
+  EXPECT_THAT(convert({"--force"}).err, HasSubstr("is no part of an .esvr file"));
+  EXPECT_EQ(bytesOf("out.esvr.partial"), "a file of somebody else");
+  EXPECT_EQ(bytesOf("out.esvr"), "mine");
+  fs::remove(at("out.esvr.partial"));
   EXPECT_EQ(convert({"--force"}).exitCode, 0);
   EXPECT_THAT(outputs(), ElementsAre("out.esvr"));
 }

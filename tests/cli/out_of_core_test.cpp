@@ -32,7 +32,7 @@ VolumeGrid denseGrid() {
   for (auto& mask : volume.active) mask.setAll();
   volume.values.resize(volume.brickCount() * kBrickVoxels);
   for (std::size_t i = 0; i < volume.values.size(); ++i)
-    volume.values[i] = 1.0f + float(i % kBrickVoxels / 64) / 8.0f;
+    volume.values[i] = 0.125f + float(i % kBrickVoxels / 64) / 8.0f;
   return grid;
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -181,6 +182,27 @@ TEST_F(Parts, haveNumbersFromOneToTheirCount) {
     EXPECT_THAT(made.err, HasSubstr("--part must be K/N"));
   }
   EXPECT_EQ(run("out.esvr", {"--part", "1/2", "--merge"}).exitCode, 2);
+}
+
+TEST_F(Parts, keepFilesOfOthersInTheirFolder) {
+  fs::create_directory(at("out.esvr.parts"));
+  test::writeText(at("out.esvr.parts/notes.txt"), "mine");
+  EXPECT_EQ(run("out.esvr", {"--resume"}).exitCode, 0);
+  EXPECT_EQ(test::readText(at("out.esvr.parts/notes.txt")), "mine");
+  EXPECT_EQ(std::distance(fs::directory_iterator(at("out.esvr.parts")), {}), 1);
+}
+
+TEST_F(Parts, followNoLinkInTheirFolder) {
+  test::writeText(at("precious"), "mine");
+  for (const char* name : {"lock", "origin"}) {
+    fs::remove_all(at("out.esvr.parts"));
+    fs::create_directory(at("out.esvr.parts"));
+    fs::create_symlink(at("precious"), at("out.esvr.parts/") + name);
+    const auto refused = run("out.esvr", {"--resume"});
+    EXPECT_EQ(refused.exitCode, 1);
+    EXPECT_THAT(refused.err, HasSubstr("not a regular file"));
+    EXPECT_EQ(test::readText(at("precious")), "mine");
+  }
 }
 
 }  // namespace

@@ -1,12 +1,18 @@
 // Plan: the ranks of MPI write the bytes of one process. If a rank is killed, the others end, and a
 // later run continues from the finished parts. Ranks that do not agree, and options that ranks do not
-// need, end all of them with a message.
+// need, end all of them with a message. What is wrong for all ranks is told once, and what is wrong for
+// one is told with its number. An interrupted run writes its best result.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <iterator>
+#include <thread>
 
 #include "cli/converters.h"
 #include "cli/folder_test.h"
@@ -24,6 +30,7 @@ class RanksTest : public test::FolderTest {
     for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
                              "OMPI_MCA_rmaps_base_oversubscribe"})
       ::setenv(name, "1", 1);
+    ::setenv("OMPI_MCA_odls_base_sigkill_timeout", "10", 1);  // the machine may be busy
     test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}});
   }
   [[nodiscard]] std::vector<std::string> conversion(const std::string& name,
@@ -94,6 +101,50 @@ TEST_F(RanksTest, KeepTheExitCodeOfAMissedTarget) {
       "2", conversion("out.esvr", {"--chunk-voxels", "600", "--psnr", "200", "--seconds", "1"}));
   EXPECT_EQ(run.exitCode, 4) << run.err;
   EXPECT_TRUE(std::filesystem::exists(at("out.esvr")));
+}
+
+/// How often a text is there.
+std::size_t countOf(const std::string& text, const std::string& all) {
+  std::size_t count = 0;
+  for (std::size_t at = all.find(text); at != all.npos; at = all.find(text, at + 1)) ++count;
+  return count;
+}
+
+TEST_F(RanksTest, SayOnceWhatIsWrongForAll) {
+  const auto wrong = onRanks("3", conversion("out.esvr", {"--no-such-option"}));
+  EXPECT_EQ(wrong.exitCode, 2);
+  EXPECT_EQ(countOf("no-such-option", wrong.err), 1u) << wrong.err;
+  EXPECT_EQ(countOf("--help", wrong.err), 1u) << wrong.err;
+  const auto missing = onRanks("3", {VDB2ESVR, at("none.vdb"), at("out.esvr")});
+  EXPECT_EQ(missing.exitCode, 3);
+  EXPECT_EQ(countOf("none.vdb", missing.err), 1u) << missing.err;
+  const auto help = onRanks("2", {VDB2ESVR, "--help"});
+  EXPECT_EQ(help.exitCode, 0);
+  EXPECT_EQ(countOf("--chunk-voxels", help.out),
+            countOf("--chunk-voxels", test::runProgram(VDB2ESVR, {"--help"}).out));
+}
+
+TEST_F(RanksTest, SaysWhichRankFailsAlone) {
+  const auto run = withRankOne("exec \"$1\" " + at("none.vdb") + " " + at("out.esvr"),
+                               conversion("out.esvr", {"--chunk-voxels", "600"}));
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, HasSubstr("rank 1: "));
+  EXPECT_THAT(run.err, HasSubstr("none.vdb"));
+}
+
+TEST_F(RanksTest, SlowWriteTheBestResultWhenInterrupted) {
+  auto command = conversion("out.esvr", {"--chunk-voxels", "600"});
+  *std::next(std::ranges::find(command, "--iterations")) = "10000000";
+  command.insert(command.begin(), {"-n", "2"});
+  test::RunningProgram program(ESVR_MPIEXEC, command);
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  ASSERT_TRUE(program.runs()) << program.err();
+  EXPECT_THAT(program.err(), HasSubstr("best result so far"));
+  program.send(SIGINT);
+  const auto run = program.wait();
+  EXPECT_NE(run.exitCode, 0);
+  EXPECT_EQ(countOf("interrupted;", run.err), 1u) << run.err;
+  EXPECT_TRUE(std::filesystem::exists(at("out.esvr"))) << run.err;
 }
 
 }  // namespace

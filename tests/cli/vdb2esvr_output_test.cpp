@@ -4,7 +4,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <csignal>
 #include <filesystem>
+#include <iostream>
+#include <thread>
 
 #include "cli/vdb2esvr_fixture.h"
 #include "esvr/container.h"
@@ -98,6 +102,32 @@ TEST_F(Interrupted, writesNothingWhereAskedTo) {
   EXPECT_EQ(run.exitCode, 1);
   EXPECT_THAT(run.err, HasSubstr("nothing was written"));
   EXPECT_THAT(folder_.names(), ElementsAre("in.vdb"));
+}
+
+TEST_F(Vdb2Esvr, SlowEndsWithinTwoSecondsOfASignal) {
+  // 2.1 million voxels, of which nothing but a search for a size takes minutes.
+  const std::string large = folder_ / "large.vdb";
+  ASSERT_EQ(test::runProgram(ESVR_SAMPLE, {"plume", large, "--resolution", "200"}).exitCode, 0);
+  for (const int signal : {SIGINT, SIGTERM})
+    for (const double after : {0.3, 2.0, 8.0, 20.0}) {
+      test::RunningProgram program(VDB2ESVR,
+                                   {large, out(), "--force", "--size", "60KB", "--device", "cpu"});
+      std::this_thread::sleep_for(std::chrono::duration<double>(after));
+      ASSERT_TRUE(program.runs());
+      const auto start = std::chrono::steady_clock::now();
+      program.send(signal);
+      const auto run = program.wait();
+      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+      std::cout << "signal " << signal << " after " << after << " s: " << seconds.count() << " s, "
+                << run.err;
+      EXPECT_LT(seconds.count(), 2.0);
+      EXPECT_EQ(run.exitCode, 1);
+      EXPECT_THAT(run.err, HasSubstr("interrupted"));
+      if (!std::filesystem::exists(out())) continue;
+      EXPECT_THAT(checkEsvr(out()), IsEmpty());
+      EXPECT_LE(std::filesystem::file_size(out()), 60'000u);
+      std::filesystem::remove(out());
+    }
 }
 
 }  // namespace

@@ -94,10 +94,9 @@ TEST_F(SequenceFiles, haveAnyPatternAndAnyDigits) {
   };
   to("in.%04d.vdb", "out.@@@@@@@@@@@@.esvr", {"--frames", "-5-0x5"});
   to("in.$F4.vdb", "out.@.esvr");
-  to("in.@.vdb", "out##/ball.esvr", {"--frames", "7"});
+  to("in.@.vdb", "out##.esvr", {"--frames", "7"});
   EXPECT_THAT(outputs(), ElementsAre("out.-00000000005.esvr", "out.-5.esvr", "out.0.esvr",
-                                     "out.000000000000.esvr", "out.12345.esvr", "out07"));
-  EXPECT_TRUE(isThere("out07/ball.esvr"));
+                                     "out.000000000000.esvr", "out.12345.esvr", "out07.esvr"));
 }
 
 TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
@@ -172,11 +171,39 @@ TEST_F(SequenceFiles, thatHoldADamagedOneFailToo) {
                              HasSubstr("2 of 3 frames failed: 2-3")));
 }
 
-TEST_F(SequenceFiles, leaveNoFolderWhereTheyFail) {
+TEST_F(SequenceFiles, areOneFileIfThePatternIsInTheNameOfAFolder) {
   writeFrames(2);
-  test::writeText(at("in.0002.vdb"), "no volume");
-  EXPECT_EQ(convert({}, "out.####/a.esvr").exitCode, 3);
-  EXPECT_THAT(outputs(), ElementsAre("out.0001"));
+  for (const char* folder : {"out@farm", "out #2", "out100%d", "out$F", "out.####"}) {
+    const std::string file = std::string(folder) + "/all.esvr";
+    EXPECT_EQ(convert({}, file).exitCode, 1) << "there is no folder " << folder;
+    EXPECT_THAT(outputs(), IsEmpty());
+    std::filesystem::create_directories(at(folder));
+    const auto run = convert({}, file);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_TRUE(std::filesystem::exists(at(file)));
+    std::filesystem::remove_all(at(folder));
+  }
+}
+
+TEST_F(SequenceFiles, withoutActiveVoxelsHaveNoSizeToKeepTo) {
+  writeFrames(1);
+  test::writeInput(at("in.0002.vdb"), {{.name = "density"}});
+  test::writeInput(at("in.0003.vdb"), {{.name = "density"}, {.name = "flame"}});
+  for (const char* output : {"out.####.esvr", "out.esvr"}) {
+    EXPECT_EQ(convert({"--ratio", "100", "--frames", "2-3"}, output).exitCode, 0);
+    EXPECT_EQ(convert({"--size", "5KB", "-f"}, output).exitCode, 0);
+  }
+}
+
+TEST_F(SequenceFiles, haveASizeBesideAGridOfAFewVoxels) {
+  for (int frame = 1; frame <= 2; ++frame)
+    test::writeInput(at(nameOf("in", frame, "vdb")),
+                     {{.voxels = test::cloud(12)},
+                      {.name = "flame", .voxels = {{{0, 0, 0}, 0.0f}, {{0, 0, 1}, 0.0f}}}});
+  const auto run = convert({"--size", "1500"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  for (int frame = 1; frame <= 2; ++frame)
+    EXPECT_LE(fs::file_size(at(nameOf("out", frame, "esvr"))), 1500u);
 }
 
 TEST_F(SequenceFiles, areReportedWithAnEntryEach) {

@@ -39,6 +39,11 @@ openvdb::FloatGrid::Ptr floatGrid(const InputGrid& input) {
   grid->insertMeta("note", openvdb::StringMetadata("of " + input.name));
   auto accessor = grid->getAccessor();
   for (const auto& [at, value] : input.voxels) accessor.setValue({at.x, at.y, at.z}, value);
+  for (const auto& [at, value] : input.inactive) accessor.setValueOff({at.x, at.y, at.z}, value);
+  constexpr openvdb::Index kRootTile = 3;  // level in the tree
+  for (const auto& [at, value] : input.largeTiles)
+    accessor.addTile(kRootTile, {at.x, at.y, at.z}, value, true);
+  grid->setSaveFloatAsHalf(input.half);
   return grid;
 }
 
@@ -68,6 +73,8 @@ openvdb::GridBase::Ptr vectorGrid(const InputVectors& input) {
   for (const auto& [at, value] : input.voxels)
     accessor.setValue({at.x, at.y, at.z}, Vector(value * input.scale[0], value * input.scale[1],
                                                  value * input.scale[2]));
+  for (const auto& [at, value] : input.inactive)
+    accessor.setValueOff({at.x, at.y, at.z}, Vector(value));
   return grid;
 }
 

@@ -24,6 +24,9 @@ struct InputGrid {
   float background = 0.0f;
   bool levelSet = false;
   InputMap map = InputMap::kUniform;
+  std::vector<InputVoxel> inactive{};    ///< inactive voxels that hold a value
+  std::vector<InputVoxel> largeTiles{};  ///< corners of active tiles of 4096^3 voxels
+  bool half = false;
 };
 
 inline constexpr const char* kInputCreator = "Houdini/SOP_OpenVDB_Write";
@@ -38,6 +41,7 @@ struct InputVectors {
   std::vector<InputVoxel> voxels{};
   std::array<float, 3> scale{1.0f, -0.5f, 0.0f};
   bool asDouble = false;
+  std::vector<InputVoxel> inactive{};  ///< inactive voxels that hold a value
 };
 
 /// Writes the grid of vectors and then the float grids, as writeInput does.

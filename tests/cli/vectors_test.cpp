@@ -76,6 +76,20 @@ TEST_F(VectorConversion, KeepsABoundForEachComponent) {
   EXPECT_GT(metrics.components[0].maxError, 0.0);
 }
 
+TEST_F(VectorConversion, KeepsAPercentageThatACheckUnderstandsInTheSameWay) {
+  convertThereAndBack({"--max-error", "1%", "--representation", "voxels"});
+  ASSERT_EQ(readEsvr(out()).vectors.size(), 1u);
+  const auto run = check({"--max-error", "1%"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const VectorGrid a = readVector(in(), "velocity"), b = readVector(back(), "velocity");
+  const VectorMetrics metrics = compareVectors(a.components, b.components);
+  const double bound = 0.01 * valueRangeOfVectors(a.components);
+  for (const auto& component : metrics.components) EXPECT_LE(component.maxError, bound);
+  EXPECT_GT(metrics.components[1].maxError, 0.5 * bound)
+      << "the smaller component has the bound of the larger one";
+  EXPECT_EQ(check({"--max-error", "0.5%"}).exitCode, 4);
+}
+
 TEST_F(VectorConversion, IsLosslessForEachComponent) {
   convertThereAndBack({"--lossless", "--representation", "voxels"});
   ASSERT_EQ(readEsvr(out()).vectors.size(), 1u);
@@ -117,7 +131,7 @@ TEST_F(VectorConversion, OfDoublesIsCarriedInALosslessFileAndFittedOtherwise) {
   test::writeVectorInput(in(), {.voxels = test::cloud(12), .asDouble = true});
   const auto run = test::vdb2esvr({in(), out(), "--lossless"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("its vectors are of doubles"));
+  EXPECT_THAT(run.out, HasSubstr("its values are doubles"));
   convertThereAndBack({"--preset", "draft"});
   EXPECT_EQ(readEsvr(out()).vectors.size(), 1u);
   EXPECT_TRUE(openvdb::gridPtrCast<openvdb::Vec3DGrid>(written()));

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "../fit/volumes.h"
+#include "codec/voxel_values.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -80,6 +81,40 @@ TEST(HalfLayer, HasTheValueOfEveryHalf) {
     ASSERT_EQ(double(negative.values[std::size_t(v)]), -halfByDefinition(kBrickVoxels - 1 - v));
 }
 
+/// Tells what a rounding of `value` should be, by a search among all halfs.
+float nearestByDefinition(double value) {
+  double best = 0.0, least = HUGE_VAL;
+  std::int32_t of = 0;
+  for (std::int32_t n = 0; n < 0x7c00; ++n) {
+    const double half = halfByDefinition(n), distance = std::abs(half - value);
+    if (distance < least || (distance == least && of % 2 != 0))
+      best = half, least = distance, of = n;
+  }
+  return float(best);
+}
+
+TEST(NearestHalf, IsTheNearestOfAllHalfs) {
+  for (const float v :
+       {0x1p-25f, 0x1.1p-24f, 0x1.8p-24f, 0x1.fffp-15f, 0x1.ffcp-15f, 0.1f, 1.0f, 0x1.002p0f,
+        0x1.006p0f, 0x1.00201p0f, 2047.5f, 2049.0f, 2051.0f, 65504.0f, 65503.0f, 1e9f})
+    EXPECT_EQ(codec::nearestHalf(v), nearestByDefinition(v)) << v;
+  for (std::int32_t n = 0; n < 0x7c00; ++n) {
+    const auto half = float(halfByDefinition(n));
+    ASSERT_EQ(codec::nearestHalf(half), half);
+    ASSERT_EQ(codec::nearestHalf(-half), -half);
+  }
+}
+
+TEST(NearestHalf, StaysWithinTheHalfsAndOnItsSideOfZero) {
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float v : {65519.0f, 65520.0f, 1e30f, infinity}) {
+    EXPECT_EQ(codec::nearestHalf(v), 65504.0f);
+    EXPECT_EQ(codec::nearestHalf(-v), -65504.0f);
+  }
+  EXPECT_EQ(codec::nearestHalf(1e-20f), 0.0f);
+  EXPECT_EQ(codec::nearestHalf(-1e-20f), -0x1p-24f);
+}
+
 TEST(AllFinite, LooksAtVoxelsThatAreNotVacant) {
   const auto infinity =
       std::int32_t(std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity()));
@@ -145,6 +180,29 @@ TEST(BoundedLayer, IsQuantisedWhereFloat32IsFinerThanTheBound) {
     EXPECT_EQ(layer.form, VoxelForm::kQuantised) << bound;
     EXPECT_LE(largestError(volume, layer), bound);
   }
+}
+
+// Bounds below, near and above the distance of halfs, which is 2^-11 for values from 0.5 to 1.
+TEST(BoundedLayer, KeepsItsBoundAfterRoundingToHalfs) {
+  const SparseVolume volume = made([](double r) { return codec::nearestHalf(float(r)); });
+  for (const double bound : {1e-5, 1.2e-4, 2.4e-4, 3e-4, 4.8e-4, 4.9e-4, 7e-4, 1e-3, 0.0123, 0.2})
+    for (const auto signs : {RoundedSigns::kMayChange, RoundedSigns::kKept}) {
+      const VoxelLayer layer =
+          boundedLayer(volume, bound, Activity::kExact, signs, nullptr, DecodedValues::kHalfs);
+      SparseVolume halfs = volumeOf(layer);
+      roundToHalfs(halfs);
+      EXPECT_LE(largestDifference(volume, halfs), bound);
+    }
+  const VoxelLayer coarse = boundedLayer(volume, 3e-4, Activity::kExact, RoundedSigns::kMayChange,
+                                         nullptr, DecodedValues::kHalfs);
+  EXPECT_EQ(coarse.form, VoxelForm::kQuantised);
+}
+
+TEST(QuantisedLayer, HasNoValueBeyondFloat) {
+  VoxelLayer layer = layerFrom(VoxelForm::kQuantised, (1 << 30) - kBrickVoxels);
+  layer.divisor = double(1 << 30) / 3.5e38;
+  EXPECT_TRUE(allFinite(layer));
+  EXPECT_EQ(volumeOf(layer).values.back(), std::numeric_limits<float>::max());
 }
 
 TEST(BoundedLayer, ByValueMakesTheBackgroundInactive) {

@@ -48,6 +48,21 @@ TEST(WithResidual, KeepsEveryVoxelWithinTheBound) {
     }
 }
 
+TEST(WithResidual, KeepsItsBoundAfterRoundingToHalfs) {
+  SparseVolume tube = test::tubeVolume();
+  roundToHalfs(tube);
+  const Field field = roughFit(tube);
+  GridDescriptor halfs;
+  halfs.valueType = ValueType::kHalf;
+  for (const auto activity : {Activity::kByValue, Activity::kExact})
+    for (const double bound : {0.3, 0.05, 0.01, 0.002, 0.0012}) {
+      const auto grid = withResidual(makeStoredGrid(halfs, tube, field, {activity}), tube, bound);
+      if (!grid) continue;  // no room for the rounding
+      EXPECT_LE(largestDifference(tube, decodeGrid(throughTheFile(*grid))), bound);
+    }
+  EXPECT_TRUE(withResidual(makeStoredGrid(halfs, tube, field), tube, 0.05));
+}
+
 TEST(WithResidual, IsSmallerTheMoreErrorIsAllowed) {
   const SparseVolume tube = test::tubeVolume();
   const StoredGrid grid = makeStoredGrid({}, tube, roughFit(tube));

@@ -262,5 +262,96 @@ TEST(BytesAdded, IsWhatAGridMakesAFileLonger) {
   EXPECT_LT(sizeOf({{}, {grid, grid}}), sizeOf({}) + 2 * bytesAdded(grid));  // stored once
 }
 
+/// A smooth pressure in a ball of voxels over a background of 0.
+SparseVolume pressureVolume() {
+  return test::volumeOf({}, 4, 0.0f, [](Coord v) {
+    const double r = std::hypot(v.x - 15.5, v.y - 15.5, v.z - 15.5);
+    return r < 14.0 ? float(101325.0 + 20.0 + 20.0 * std::cos(0.2 * r)) : 0.0f;
+  });
+}
+
+/// Expects the exact mask and background, and active values that lie within those of the source.
+void expectNothingBetween(const SparseVolume& source, const StoredGrid& grid) {
+  EXPECT_TRUE(grid.farBackground);
+  const SparseVolume decoded = decodeGrid(grid);
+  EXPECT_EQ(compareVolumes(source, decoded).iou, 1.0);
+  EXPECT_EQ(decoded.background, 0.0f);
+  const ValueRange wanted = activeRange(source), found = activeRange(decoded);
+  const double rounding = 1.0;  // of quantised voxels, far less than from the values to 0
+  EXPECT_GE(found.min, wanted.min - rounding);
+  EXPECT_LE(found.max, wanted.max + rounding);
+  for (std::size_t b = 0; b < decoded.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      ASSERT_TRUE(decoded.active[b].test(v) || decoded.brickValues(b)[std::size_t(v)] == 0.0f);
+}
+
+TEST(FarBackground, ReachesThePsnrOfTheRangeInBothRepresentations) {
+  const SparseVolume volume = pressureVolume();
+  for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
+    const Conversion made = converted(volume, PsnrGoal{35.0}, representation);
+    EXPECT_GE(psnrOf(volume, made.grid), 35.0);
+    EXPECT_LT(psnrOf(volume, made.grid), 37.0);
+    EXPECT_EQ(made.grid.voxels.has_value(), representation == Representation::kVoxels);
+    expectNothingBetween(volume, made.grid);
+  }
+}
+
+TEST(FarBackground, KeepsABoundAndASizeAndTheNumberOfEllipsoids) {
+  const SparseVolume volume = pressureVolume();
+  const Conversion within = converted(volume, BoundGoal{0.01, true}, Representation::kAuto);
+  EXPECT_LE(compareVolumes(volume, decodeGrid(within.grid)).maxError, 0.4);
+  expectNothingBetween(volume, within.grid);
+
+  const Conversion sized = converted(volume, SizeGoal{3000}, Representation::kAuto);
+  EXPECT_LE(bytesAdded(sized.grid), 3000u);
+  expectNothingBetween(volume, sized.grid);
+
+  ConvertOptions options = optionsFor(FitGoal{});
+  options.fit.count = 200;
+  const Conversion fitted = convertVolume({kDescriptor, volume}, options);
+  EXPECT_GT(psnrOf(volume, fitted.grid), 30.0) << "relative to 0, the border takes all ellipsoids";
+  expectNothingBetween(volume, fitted.grid);
+}
+
+TEST(FarBackground, IsStoredAsItIsWithoutLoss) {
+  const SparseVolume volume = pressureVolume();
+  const Conversion made = converted(volume, LosslessGoal{}, Representation::kVoxels);
+  EXPECT_FALSE(made.grid.farBackground);
+  EXPECT_EQ(largestDifference(volume, decodeGrid(made.grid)), 0.0);
+}
+
+TEST(FarBackground, OfThePreviousFrameIsKeptIfItIsAmongTheValues) {
+  const SparseVolume before = pressureVolume();
+  SparseVolume after = before;
+  for (std::size_t b = 0; b < after.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (after.active[b].test(v)) after.brickValues(b)[std::size_t(v)] += 1.0f;
+  ConvertOptions options = optionsFor(PsnrGoal{40.0});
+  options.representation = Representation::kVoxels;
+  const StoredGrid first = convertVolume({kDescriptor, before}, options).grid;
+  options.previous = &first;
+  const StoredGrid second = convertVolume({kDescriptor, after}, options).grid;
+  EXPECT_EQ(second.field.background, first.field.background);
+  expectNothingBetween(after, second);
+  EXPECT_GE(psnrOf(after, second), 40.0);
+}
+
+TEST(FarBackground, TakesNoThresholdAndNeedsADecoding) {
+  const StoredGrid grid =
+      converted(pressureVolume(), PsnrGoal{30.0}, Representation::kEllipsoids).grid;
+  EXPECT_THROW((void)decodeGrid(grid, {.threshold = 1.0f}), UsageError);
+  EXPECT_FALSE(followsFromEllipsoids(grid));
+}
+
+TEST(FarBackground, IsNotThatOfAScanFromAThresholdOn) {
+  const SparseVolume scan = test::volumeOf({}, 4, 0.0f, [](Coord v) {
+    const double r = std::hypot(v.x - 15.5, v.y - 15.5, v.z - 15.5);
+    return r < 12.0 ? float(1.0 - 0.07 * r) : 0.0f;
+  });
+  const Conversion made = converted(scan, PsnrGoal{35.0}, Representation::kVoxels);
+  EXPECT_FALSE(made.grid.farBackground);
+  EXPECT_EQ(made.grid.field.background, 0.0f);
+}
+
 }  // namespace
 }  // namespace esvr

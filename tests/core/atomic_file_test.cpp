@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/partial_file.h"
 #include "esvr/error.h"
 #include "support/file_size_limit.h"
 #include "support/temporary_folder.h"
@@ -181,6 +182,32 @@ TEST_F(AtomicFileTest, LeavesTheTemporaryFilesOfOthersAlone) {
   EXPECT_FALSE(fs::exists(folder_ / ".esvr-0badcafe.tmp"));
   alive.commit();
   EXPECT_TRUE(fs::exists(target()));
+}
+
+/// Runs in a process without the standard descriptors. \return 0 if a file that is written gets none
+/// of their numbers, and if what is printed fails
+int writeWithoutStandardDescriptors(const std::filesystem::path& target) {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) ::close(fd);
+  AtomicFile file(target, true);
+  PartialFile partial(target.string() + "2", true, PartialStart::kRefuse);
+  if (::write(STDERR_FILENO, "message", 7) >= 0) return 1;
+  if (::write(STDOUT_FILENO, "message", 7) >= 0) return 2;
+  partial.append(std::as_bytes(std::span(std::string_view("content"))));
+  partial.commit();
+  file.commit();
+  return 0;
+}
+
+TEST(AtomicFileAlone, DoesNotGetTheNumberOfAClosedStandardError) {
+  const test::TemporaryFolder folder;
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(writeWithoutStandardDescriptors(folder / "out"));
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(std::filesystem::file_size(folder / "out"), 0u);
+  EXPECT_EQ(std::filesystem::file_size(folder / "out2"), 7u);
 }
 
 }  // namespace

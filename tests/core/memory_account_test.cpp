@@ -1,5 +1,6 @@
 // Plan: the account limits the bytes of all buffers exactly, also from many threads. A refused
-// request changes nothing, and its message says what was refused. Limits are restored. Numbers of
+// request changes nothing, and its message says what was refused. A share counts and limits the
+// buffers of one thread, whichever share ends first. Numbers of
 // objects beyond 32 bits are refused by name.
 
 #include "core/cuda/memory_account.h"
@@ -7,6 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <barrier>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -52,27 +55,84 @@ TEST(MemoryAccount, CountsFromManyThreads) {
   EXPECT_EQ(account.held(), 0u);
 }
 
-TEST(MemoryAccount, LimitsEndWithTheirOwner) {
+TEST(MemoryAccount, OfAPartIsLimitedByTheWholeToo) {
+  MemoryAccount whole;
+  whole.setLimit(100);
+  MemoryAccount part(whole), other(whole);
+  part.setLimit(80);
+  EXPECT_THROW(part.take(81), DeviceMemoryError);
+  part.take(70);
+  EXPECT_THROW(other.take(31), DeviceMemoryError);
+  EXPECT_EQ(other.held(), 0u);
+  other.take(30);
+  EXPECT_EQ(whole.held(), 100u);
+  part.give(70);
+  other.give(30);
+  EXPECT_EQ(whole.held(), 0u);
+  EXPECT_EQ(part.peak(), 70u);
+  EXPECT_EQ(whole.peak(), 100u);
+}
+
+TEST(MemoryShare, EndsWithItsOwner) {
   {
-    const LimitMemory limit(10);
+    const MemoryShare share(10);
     EXPECT_THROW(memoryAccount().take(11), DeviceMemoryError);
   }
   memoryAccount().take(11);
   memoryAccount().give(11);
 }
 
-TEST(MemoryAccount, LimitsOneDevice) {
-  const LimitMemory limit(10);
-  std::thread other([] {
-    accountedDevice() = 1;
-    EXPECT_NO_THROW(memoryAccount().take(11));
-    memoryAccount().give(11);
-    const LimitMemory own(5);
+TEST(MemoryShare, IsThatOfOneDevice) {
+  const MemoryShare share(10);
+  accountedDevice() = 1;
+  EXPECT_NO_THROW(memoryAccount().take(11));
+  memoryAccount().give(11);
+  {
+    const MemoryShare own(5);
     EXPECT_THROW(memoryAccount().take(6), DeviceMemoryError);
-  });
-  other.join();
+  }
+  accountedDevice() = 0;
   EXPECT_NO_THROW(memoryAccount().take(10));
   memoryAccount().give(10);
+}
+
+TEST(MemoryShare, DoesNotDependOnWhichOfSeveralEndsFirst) {
+  auto first = std::make_unique<MemoryShare>(10);
+  auto second = std::make_unique<MemoryShare>(20);
+  memoryAccount().take(15);
+  first.reset();
+  EXPECT_THROW(memoryAccount().take(6), DeviceMemoryError);
+  memoryAccount().give(15);
+  EXPECT_EQ(second->peak(), 15u);
+  second.reset();
+  EXPECT_NO_THROW(memoryAccount().take(21));
+  memoryAccount().give(21);
+  EXPECT_EQ(deviceAccount().held(), 0u);
+}
+
+// Two fits that overlap, the first of which ends first.
+TEST(MemoryShare, OfOneThreadKnowsNothingOfThoseOfOthers) {
+  std::barrier both(2);
+  const auto fit = [&](std::size_t limit, bool endsFirst) {
+    {
+      const MemoryShare share(limit);
+      both.arrive_and_wait();
+      memoryAccount().take(limit);
+      EXPECT_THROW(memoryAccount().take(1), DeviceMemoryError);
+      both.arrive_and_wait();
+      EXPECT_EQ(share.peak(), limit);
+      if (!endsFirst) both.arrive_and_wait();  // the other share has ended
+      EXPECT_THROW(memoryAccount().take(1), DeviceMemoryError);
+      memoryAccount().give(limit);
+    }
+    if (endsFirst) both.arrive_and_wait();
+    EXPECT_NO_THROW(memoryAccount().take(100));  // no limit is left
+    memoryAccount().give(100);
+  };
+  std::thread other([&] { fit(30, true); });
+  fit(50, false);
+  other.join();
+  EXPECT_EQ(deviceAccount().held(), 0u);
 }
 
 TEST(Count32, RefusesByNameWhatKernelsCannotNumber) {

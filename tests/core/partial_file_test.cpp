@@ -5,12 +5,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <atomic>
 #include <fstream>
 #include <functional>
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <thread>
 
 #include "esvr/error.h"
 #include "support/temporary_folder.h"
@@ -61,18 +64,51 @@ TEST_F(PartialFileTest, LeavesNothingWithoutContent) {
   EXPECT_THAT(folder_.names(), IsEmpty());
 }
 
-TEST_F(PartialFileTest, IsRefusedOrReplacedAsWanted) {
+TEST_F(PartialFileTest, IsRefusedAsWanted) {
   leave("one");
   expectRefused(false, PartialStart::kRefuse, "out.esvr.partial");
   EXPECT_EQ(content(PartialFile::pathFor(target())), "one");
-  PartialFile file(target(), false, PartialStart::kReplace);
-  EXPECT_EQ(file.size(), 0u);
+}
+
+TEST_F(PartialFileTest, FollowsNoLinkAndOpensNoPipe) {
+  const fs::path partial = PartialFile::pathFor(target());
+  std::ofstream(folder_ / "other") << "other";
+  fs::create_symlink(folder_ / "other", partial);
+  expectRefused(true, PartialStart::kContinue, "cannot write");
+  EXPECT_EQ(content(folder_ / "other"), "other");
+  fs::remove(partial);
+  ASSERT_EQ(::mkfifo(partial.c_str(), 0600), 0);
+  expectRefused(true, PartialStart::kContinue, "not a regular file");
+}
+
+/// What another process completes between open() and lock() has the name of the target then. The
+/// first process holds the lock until it has renamed the file, so that the second one waits here for
+/// the lock of a file that is no longer partial.
+TEST_F(PartialFileTest, DoesNotTouchWhatAnotherProcessHasJustCompletedSlow) {
+  for (int round = 0; round < 200; ++round) {
+    std::atomic<bool> isOpen = false;
+    std::thread first([&] {
+      PartialFile file(target(), true, PartialStart::kContinue);
+      file.truncate(0);
+      file.append(std::as_bytes(std::span(std::string_view("first"))));
+      isOpen = true;
+      file.commit();
+    });
+    while (!isOpen) std::this_thread::yield();
+    for (bool isDone = false; !isDone;) try {
+        PartialFile second(target(), true, PartialStart::kContinue);
+        EXPECT_EQ(second.size(), 0u) << "the first process's output";
+        isDone = true;
+      } catch (const RuntimeFailure&) {  // the first process still has the lock
+      }
+    first.join();
+    ASSERT_EQ(content(target()), "first");
+  }
 }
 
 TEST_F(PartialFileTest, HasOneWriter) {
   const PartialFile first(target(), false, PartialStart::kRefuse);
   expectRefused(false, PartialStart::kContinue, "another process writes it");
-  expectRefused(false, PartialStart::kReplace, "another process writes it");
 }
 
 TEST_F(PartialFileTest, KeepsATargetThatExists) {

@@ -168,6 +168,53 @@ TEST(FindBrick, FindsEveryBrickAndNoOther) {
   EXPECT_FALSE(findBrick(volume, {2, 0, 0}));
 }
 
+struct PeakCase {
+  const char* what;
+  ValueRange active;
+  double background, peak;
+  bool isFar;
+};
+
+class Peak : public testing::TestWithParam<PeakCase> {};
+
+TEST_P(Peak, IsTheRangeOfOneSignAndTheMagnitudeOfTwo) {
+  const PeakCase& c = GetParam();
+  EXPECT_DOUBLE_EQ(peakOf(c.active, c.background), c.peak) << c.what;
+  EXPECT_EQ(spanOf(c.active, c.background).farBackground, c.isFar) << c.what;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, Peak,
+    testing::Values(
+        PeakCase{"a density", {0.0f, 5.5f}, 0.0, 5.5, false},
+        PeakCase{"a scan from a threshold on", {0.125f, 1.0f}, 0.0, 1.0, false},
+        PeakCase{"a background as far as the values are long", {1.0f, 2.0f}, 0.0, 2.0, false},
+        PeakCase{"a background that is farther", {1.5f, 2.0f}, 0.0, 0.5, true},
+        PeakCase{"a pressure", {101325.0f, 101365.0f}, 0.0, 40.0, true},
+        PeakCase{"kelvin", {280.0f, 310.0f}, 0.0, 30.0, true},
+        PeakCase{"kelvin over an ambient background", {280.0f, 310.0f}, 293.0, 30.0, false},
+        PeakCase{"no data", {-2.0f, 3.0f}, -9999.0, 3.0, true},
+        PeakCase{"a signed distance", {-3.0f, 3.0f}, 3.0, 3.0, false},
+        PeakCase{"a band inside its background", {-0.125f, 0.25f}, 0.5, 0.25, false},
+        PeakCase{"distances below the background", {0.0f, 2.5f}, 3.0, 2.5, false},
+        PeakCase{"from 0 up, over -1", {0.0f, 1.0f}, -1.0, 1.0, false},
+        PeakCase{"a velocity", {-8.0f, 2.0f}, 0.0, 8.0, false},
+        PeakCase{"only negative", {-3.0f, -1.0f}, 0.0, 3.0, false},
+        PeakCase{"negative and offset", {-103.0f, -100.0f}, 0.0, 3.0, true},
+        PeakCase{"constant", {-7.0f, -7.0f}, 0.0, 7.0, false},
+        PeakCase{"constant beside its background", {7.0f, 7.0f}, 6.0, 7.0, false},
+        PeakCase{"zeros", {0.0f, 0.0f}, 0.0, 1.0, false},
+        PeakCase{"extreme", {-3e38f, 3e38f}, 0.0, double(3e38f), false}));
+
+TEST(SetBackground, ChangesInactiveVoxelsOnly) {
+  SparseVolume volume = makeVolume({brickWith({0, 0, 0}, {1, 2, 3})}, 9.0f);
+  setBackground(4.0f, volume);
+  EXPECT_EQ(volume.background, 4.0f);
+  EXPECT_EQ(valueAt(volume, {1, 2, 3}), 1.0f);
+  EXPECT_EQ(valueAt(volume, {1, 2, 4}), 4.0f);
+  EXPECT_EQ(valueAt(volume, {8, 0, 0}), 4.0f);
+}
+
 class BrokenVolume : public testing::Test {
  protected:
   SparseVolume volume = makeVolume({brickWith({0, 0, 0}, {}), brickWith({0, 0, 8}, {})}, 0.0f);

@@ -1,11 +1,15 @@
 // Plan: every part is run once, and its result stands in its place, on one device and on several. Two
-// devices work at the same time. An error of a part ends the run.
+// devices work at the same time. An error of a part ends the run. If a device fails, the others do
+// its parts, and this is told once; where none is left, the run fails.
 
 #include "esvr/device_workers.h"
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <barrier>
+#include <string>
+#include <vector>
 
 #include "distribute/fake_parts.h"
 #include "esvr/error.h"
@@ -40,6 +44,49 @@ TEST(DeviceWorkers, EndWithTheErrorOfAPart) {
       EXPECT_EQ(parts.fits()[4], 0);
     }
   }
+}
+
+/// Parts of which one device can fit none.
+class PartsForOthers : public test::FakeParts {
+ public:
+  PartsForOthers(std::size_t count, const Device& full) : FakeParts(count), full_(full) {}
+  [[nodiscard]] PartOutput fit(std::size_t part, const Device& device) const override {
+    if (device == full_) {
+      hasFailed_ = true;
+      hasFailed_.notify_all();
+      throw DeviceError("it is full");
+    }
+    hasFailed_.wait(false);  // the others do not do all parts before it begins
+    return FakeParts::fit(part, device);
+  }
+
+ private:
+  Device full_;
+  mutable std::atomic<bool> hasFailed_{false};
+};
+
+const Device kFirst{DeviceKind::kCuda, 0}, kSecond{DeviceKind::kCuda, 1};
+
+TEST(DeviceWorkers, LeaveTheirPartsToTheOthersWhereOneDeviceFails) {
+  for (const Device& full : {kFirst, kSecond}) {
+    const PartsForOthers parts(10, full);
+    std::vector<std::string> told;
+    DeviceWorkers workers({kFirst, kSecond, kFirst, kSecond},
+                          [&](const Device& device, const std::string& why) {
+                            EXPECT_TRUE(device == full);
+                            told.push_back(why);
+                          });
+    EXPECT_EQ(workers.run(parts), test::resultsOfParts(10));
+    EXPECT_EQ(workers.run(parts), test::resultsOfParts(10));  // of the next round
+    EXPECT_EQ(parts.fits(), std::vector<int>(10, 2));
+    EXPECT_EQ(told, std::vector<std::string>{"it is full"});
+  }
+}
+
+TEST(DeviceWorkers, FailWhereNoDeviceIsLeft) {
+  const PartsForOthers parts(10, kFirst);
+  DeviceWorkers workers({kFirst, kFirst});
+  EXPECT_THROW((void)workers.run(parts), DeviceError);
 }
 
 }  // namespace

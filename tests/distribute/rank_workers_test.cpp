@@ -47,6 +47,7 @@ class TwoRanks : public Ranks {
     }
     return all;
   }
+  bool allEnd(double) override { return true; }
   void abort(int exitCode) override { std::exit(exitCode); }
 
  private:

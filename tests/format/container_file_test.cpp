@@ -126,13 +126,32 @@ TEST_F(ContainerFile, InspectionDoesNotReadTheSections) {
   EXPECT_THROW((void)readEsvr(path()), BadInput);
 }
 
+constexpr std::size_t kUniformMapBytes = 15 * sizeof(double);  // five vectors
+
+StoredGrid withMap(StoredGrid grid, std::size_t bytes) {
+  grid.descriptor.transform.mapType = "UniformScaleMap";
+  grid.descriptor.transform.map.assign(bytes, std::byte{});
+  return grid;
+}
+
 TEST_F(ContainerFile, CheckHasNothingToSayOfAGoodFile) {
-  writeEsvr(path(), test::fileOf(test::fogGrid(100)));
+  writeEsvr(path(), test::fileOf(withMap(test::fogGrid(100), kUniformMapBytes)));
   EXPECT_THAT(checkEsvr(path()), IsEmpty());
 }
 
+TEST_F(ContainerFile, CheckRefusesATransformThatIsTooShortOrTooLong) {
+  for (const std::size_t bytes : {std::size_t{0}, kUniformMapBytes - 1, kUniformMapBytes + 1}) {
+    const fs::path file = path();
+    fs::remove(file);
+    writeEsvr(file, test::fileOf(withMap(test::fogGrid(100), bytes)));
+    EXPECT_NO_THROW((void)readEsvr(file)) << "voxels need no transform";
+    EXPECT_THAT([&] { (void)checkEsvr(file); },
+                ThrowsMessage<BadInput>(HasSubstr("not a map of type UniformScaleMap")));
+  }
+}
+
 TEST_F(ContainerFile, CheckNotesWhatAReaderPassesOver) {
-  StoredGrid odd = test::emptyGrid();
+  StoredGrid odd = withMap(test::emptyGrid(), kUniformMapBytes);
   odd.field.background = 2.0f;
   test::CraftedFile crafted(encodeEsvr(test::fileOf(odd)));
   crafted.versionMinor = 7;

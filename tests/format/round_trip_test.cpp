@@ -133,5 +133,29 @@ TEST(RoundTrip, EncodingAgainGivesTheSameBytes) {
   EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "memory")), bytes);
 }
 
+TEST(RoundTrip, AFarBackgroundRaisesTheVersionAndComesBack) {
+  const auto minorVersionOf = [](const std::vector<std::byte>& bytes) { return int(bytes[10]); };
+  StoredGrid grid = test::fogGrid(7);
+  EXPECT_LT(minorVersionOf(encodeEsvr(test::fileOf(grid))), 5);
+  grid.farBackground = true;
+  grid.topology = TopologyKind::kThreshold;
+  grid.field.background = 300.0f;
+  EsvrFile file = test::fileOf(grid);
+  for (const auto layout : {FileLayout::kPlain, FileLayout::kCompact}) {
+    file.layout = layout;
+    const auto bytes = encodeEsvr(file);
+    EXPECT_EQ(minorVersionOf(bytes), 5);
+    const EsvrFile back = decodeEsvr(bytes, "memory");
+    EXPECT_EQ(difference(back, file), "");
+    EXPECT_TRUE(back.grids.front().farBackground);
+  }
+}
+
+TEST(RoundTrip, AFarBackgroundOfBricksIsRefused) {
+  StoredGrid grid = test::levelSetGrid(7);
+  grid.farBackground = true;
+  EXPECT_THROW((void)encodeEsvr(test::fileOf(grid)), RuntimeFailure);
+}
+
 }  // namespace
 }  // namespace esvr

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include "../fit/volumes.h"
@@ -17,6 +18,7 @@
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "format/byte_writer.h"
+#include "format/checksum.h"
 #include "format/crafted_file.h"
 #include "format/frame_table.h"
 #include "format/related_voxels.h"
@@ -367,6 +369,18 @@ TEST(CompactLayout, WithPackedSectionsOfAFrameIsRefused) {
         decode(withPacked({{.metadata = true}, {}}, {}));
       },
       ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr("another frame"))));
+}
+
+TEST(CompactLayout, WithPackedSectionsWithoutTheMarkOfAFrameIsRefused) {
+  Bytes content = format::putFrame({}, {});
+  content.front() = std::byte{46};
+  const std::uint64_t sum =
+      format::checksum(std::span(content).first(content.size() - sizeof(sum)));
+  std::memcpy(content.data() + content.size() - sizeof(sum), &sum, sizeof(sum));
+  test::CraftedFile crafted(encodeEsvr(compact(twoAlike())));
+  crafted.setContent(SectionKind::kPacked, content);
+  EXPECT_THAT([&] { decode(crafted.assemble()); },
+              ThrowsMessage<BadInput>(HasSubstr("no mark of a frame")));
 }
 
 TEST(CompactLayout, WithPackedSectionsInPackedSectionsIsRefused) {

@@ -20,7 +20,7 @@ void readAll(const std::filesystem::path& path) {
     try {
       const auto read =
           readGrid(path, grid.uniqueName,
-                   {.nonFinite = NonFinite::kZero, .allowEmpty = true, .maxBytes = kMaxBytes});
+                   {.nonFinite = NonFinite::kValue, .allowEmpty = true, .maxBytes = kMaxBytes});
       checkInvariants(read.volume);
     } catch (const BadInput&) {
     } catch (const MemoryExceeded&) {

@@ -51,5 +51,19 @@ TEST(CompareVectors, HaveAPeakThatIsPositive) {
   EXPECT_DOUBLE_EQ(peakOfVectors(constants(0, 0, 0)), 1.0);
 }
 
+TEST(CompareVectors, HaveAPeakThatDoesNotFallWithTheRangeOfTheirLengths) {
+  VectorVolume vectors = constants(3, 4, 0);
+  vectors[1].values[0] = 3.9f;
+  EXPECT_DOUBLE_EQ(peakOfVectors(vectors), 5.0);
+}
+
+TEST(CompareVectors, HaveOneRangeWhichIsTheLargestOfAComponent) {
+  VectorVolume vectors = constants(3, 4, 0);
+  vectors[1].values[0] = -1.0f;
+  vectors[2].values[0] = 2.0f;
+  EXPECT_DOUBLE_EQ(valueRangeOfVectors(vectors), 5.0);
+  EXPECT_DOUBLE_EQ(valueRangeOfVectors(constants(1, 1, 1)), 0.0);
+}
+
 }  // namespace
 }  // namespace esvr

@@ -249,12 +249,23 @@ TEST(CompareVolumes, refusesAPeakThatIsNotPositive) {
   EXPECT_THROW((void)compareVolumes(a, a, {.peak = std::nan("")}), UsageError);
 }
 
-TEST(CompareVolumes, takesTheLargestMagnitudeAsPeakWhereNoValueIsPositive) {
-  EXPECT_EQ(peakOf(volumeOf({{{0, 0, 0}, -9.0f}, {{1, 0, 0}, 2.0f}})), 2.0);
+TEST(CompareVolumes, takesTheRangeAsPeakOfOneSignAndTheLargestMagnitudeOfTwo) {
+  EXPECT_EQ(peakOf(volumeOf({{{0, 0, 0}, -9.0f}, {{1, 0, 0}, 2.0f}})), 9.0);
+  EXPECT_EQ(peakOf(volumeOf({{{0, 0, 0}, 101325.0f}, {{1, 0, 0}, 101365.0f}})), 40.0);
   EXPECT_EQ(peakOf(volumeOf({{{0, 0, 0}, -3.0f}, {{1, 0, 0}, -1.0f}})), 3.0);
   EXPECT_EQ(peakOf(volumeOf({{{0, 0, 0}, 0.0f}})), 1.0);
   const auto negative = volumeOf({{{0, 0, 0}, -4.0f}});
   EXPECT_EQ(compareVolumes(negative, negative).peak, 4.0);
+}
+
+TEST(CompareVolumes, measuresARangeForPercentagesWithoutTheBackground) {
+  EXPECT_EQ(valueRangeOf(volumeOf({{{0, 0, 0}, 0.25f}, {{1, 0, 0}, 1.0f}})), 0.75);
+  EXPECT_EQ(valueRangeOf(volumeOf({{{0, 0, 0}, 5.0f}})), 0.0);
+}
+
+TEST(CompareVolumes, callsAnInfiniteValueBadInputAndNoWrongPeak) {
+  const auto a = volumeOf({{{0, 0, 0}, 1.0f}, {{1, 0, 0}, std::numeric_limits<float>::infinity()}});
+  EXPECT_THROW((void)compareVolumes(a, a), BadInput);
 }
 
 TEST(CompareVolumes, refusesAnEmptyBox) {

@@ -32,6 +32,71 @@ def test_arrays_of_other_types_and_orders_are_converted():
     assert np.array_equal(esvr.Volume.from_numpy(np.asfortranarray(array)).to_numpy(), array)
 
 
+@pytest.mark.parametrize("dtype", [float, int, np.float32])
+def test_masked_elements_are_inactive(dtype):
+    array = np.ma.masked_equal(np.array([[[1, 2, 999, 4]]], dtype=dtype), 999)
+    volume = esvr.Volume.from_numpy(array)
+    assert volume.active_voxels == 3
+    assert volume.to_numpy(((0, 0, 0), (0, 0, 3))).tolist() == [[[1, 2, 0, 4]]]
+    assert esvr.Volume.from_numpy(np.ma.array([[[1.0]]])).active_voxels == 1, "without a mask"
+
+
+@pytest.mark.parametrize("hidden", [np.nan, 1e300])
+def test_what_a_mask_hides_does_not_matter(hidden):
+    array = np.ma.array([[[1.0, hidden]]], mask=[[[False, True]]])
+    assert esvr.Volume.from_numpy(array).active_voxels == 1
+
+
+@pytest.mark.parametrize("dtype, value", [
+    (np.int32, 2**24 + 1), (np.uint32, 2**32 - 1), (np.int64, -2**24 - 1), (np.int64, 2**63 - 1),
+    (np.uint64, 2**64 - 1), (np.int64, 2**62 + 1)])
+def test_integers_that_would_change_are_refused(dtype, value):
+    array = np.array([[[1, value]]], dtype=dtype)
+    with pytest.raises(ValueError, match=r"\(5, 0, 1\) is no float32"):
+        esvr.Volume.from_numpy(array, origin=(5, 0, 0))
+    masked = np.ma.array(array, mask=[[[False, True]]])
+    assert esvr.Volume.from_numpy(masked).active_voxels == 1
+
+
+@pytest.mark.parametrize("dtype, value", [
+    (np.int32, 2**24 + 2), (np.int32, -2**31), (np.int64, 2**62), (np.int64, -2**63), (np.uint64, 2**63),
+    (bool, True), (np.float16, 0.5)])
+def test_numbers_that_float32_has_are_kept(dtype, value):
+    volume = esvr.Volume.from_numpy(np.array([[[value]]], dtype=dtype))
+    assert volume.to_numpy()[0, 0, 0] == np.float64(value) and volume.rounded_values == 0
+
+
+def test_rounded_doubles_are_counted():
+    volume = esvr.Volume.from_numpy(np.array([[[0.5, 0.1, 0.2, 1e-60]]]), threshold=0.15)
+    assert volume.active_voxels == 2 and volume.rounded_values == 1
+    assert esvr.Volume.from_numpy(np.full((9, 9, 9), 1 / 3)).rounded_values == 729
+
+
+@pytest.mark.parametrize("array, text", [
+    (np.array([[["2020-01-01"]]], dtype="datetime64[D]"), "datetime64"),
+    (np.zeros((1, 1, 1), dtype="timedelta64[s]"), "timedelta64"),
+    (np.zeros((1, 1, 1), dtype=[("a", float), ("b", float)]), "'a'"),
+    (np.array([[["7"]]]), "<U1"),
+    (np.array([[[1, None]]], dtype=object), "object"),
+    (np.array([[[1 + 2j]]]), "complex"),
+    (np.array([[[1e39]]]), r"\(0, 0, 0\) is beyond"),
+])
+def test_arrays_that_are_no_numbers_are_refused(array, text):
+    with pytest.raises(ValueError, match=text):
+        esvr.Volume.from_numpy(array)
+
+
+@pytest.mark.parametrize("last", [2**31 - 1, -2**31])
+@pytest.mark.parametrize("side", [1, 9])
+def test_voxels_at_the_ends_of_the_index_space_are_kept(tmp_path, last, side):
+    corner = last - side + 1 if last > 0 else last
+    volume = esvr.Volume.from_numpy(np.ones((side, side, side)), origin=(corner,) * 3)
+    assert volume.active_voxels == side**3
+    assert volume.box == [[corner] * 3, [corner + side - 1] * 3]
+    volume.save(tmp_path / "a.vdb")
+    assert esvr.Volume.from_vdb(tmp_path / "a.vdb").box == volume.box
+
+
 def test_the_threshold_decides_which_voxels_are_active():
     array = np.array([[[0.0, 0.1, 0.2, 0.3]]])
     assert esvr.Volume.from_numpy(array, threshold=0.15).active_voxels == 2

@@ -29,7 +29,7 @@ SparseVolume volumeAt(const std::vector<Coord>& corners, float background = 0.0f
 
 Image marched(const SparseVolume& volume, const RenderOptions& o) {
   const BrickAtlas atlas = makeBrickAtlas(volume);
-  Picture picture(o);
+  Picture picture(o, kNoPlaces);
   const auto pages = atlas.pages();
   const Coord origin = atlas.table.origin;
   View view = picture.view;
@@ -112,7 +112,7 @@ TEST(BrickAtlas, RaysThatWaitForBricksHaveTheSameBits) {
   const auto pages = atlas.pages();
   RenderOptions o = optionsFor(volume, {.eye = Vec3{100, 5, 4}, .center = Vec3{0, 4, 4}});
   o.minTransmittance = 0.0;
-  const Picture picture(o);
+  const Picture picture(o, kNoPlaces);
   MarchScene scene{picture.view, cellsOf(atlas.table), o.step, clipOf(o),
                    sampleRule(o, picture.table.view(), volume.background)};
   const Coord origin = atlas.table.origin;
@@ -138,7 +138,7 @@ TEST(BrickAtlas, SamplesDoNotDependOnTheRangeThatIsWanted) {
   const auto volume = volumeAt({{0, 0, 0}, {40, 0, 16}});
   RenderOptions o = optionsFor(volume);
   o.step = 0.25;
-  const Picture picture(o);
+  const Picture picture(o, kNoPlaces);
   const MarchScene scene{picture.view,
                          {{0, 0, 0}, {48, 8, 24}},
                          o.step,

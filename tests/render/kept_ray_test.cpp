@@ -49,8 +49,9 @@ struct Scene {
     return {std::vector(atlas.table.bricks.size(), BrickSlotsView::kMissing), all()};
   }
   [[nodiscard]] MarchScene march(const RenderOptions& o, const TransferTableView& table) const {
-    MarchScene scene = sceneOfLevel(marchScene(o, sampleRule(o, table, volume.background)),
-                                    LevelFrame{0}, atlas.table.origin);
+    MarchScene scene = sceneOfLevel(
+        marchScene(o, View(o.camera, o.resolution), sampleRule(o, table, volume.background)),
+        LevelFrame{0}, atlas.table.origin);
     scene.box = cellsOf(atlas.table);
     return scene;
   }

@@ -119,6 +119,30 @@ TEST_F(ParaViewPreset, InTheOlderXmlIsRead) {
   EXPECT_EQ(opacityAt(veil.opacity, 0.0), 0.375);
 }
 
+std::string utf16(const std::string& text, bool bigEndian) {
+  std::string units = bigEndian ? "\xfe\xff" : "\xff\xfe";
+  for (const char c : text) units += bigEndian ? std::string{'\0', c} : std::string{c, '\0'};
+  return units;
+}
+
+TEST_F(ParaViewPreset, OfWindowsIsRead) {
+  const auto expected = read(kOldMaps);
+  EXPECT_EQ(read(std::string("\xef\xbb\xbf") + kOldMaps), expected);
+  EXPECT_EQ(read(utf16(kOldMaps, false)), expected);
+  EXPECT_EQ(read(utf16(kOldMaps, true)), expected);
+  EXPECT_EQ(read(std::string("\xef\xbb\xbf") + kTwoPresets, "first"), read(kTwoPresets, "first"));
+}
+
+TEST_F(ParaViewPreset, WithWhatParaViewWritesIsRead) {
+  const auto f = read(R"(// a comment
+{"Name": "a", "ColorSpace": "Lab/CIEDE2000", "Points": null, "NanColor": null,
+ "RGBPoints": [0, 0, 0, 1.0000000001, 1, -1e-9, 1, 0]})");
+  EXPECT_EQ(f.colors.space, ColorSpace::kLab);
+  EXPECT_EQ(f.colors.points[0].color, (Rgb{0, 0, 1}));
+  EXPECT_EQ(f.colors.points[1].color, (Rgb{0, 1, 0}));
+  EXPECT_THAT(refusal(R"({"RGBPoints": [0, 0, 0, 1.01, 1, 0, 1, 0]})"), HasSubstr("p.json"));
+}
+
 TEST_F(ParaViewPreset, InDamagedXmlIsRefused) {
   EXPECT_THAT(refusal("<ColorMap><Point"), HasSubstr("p.json: not XML"));
   EXPECT_THAT(refusal("<ColorMap><Point x='a' r='0' g='0' b='0'/></ColorMap>"),

@@ -54,6 +54,33 @@ TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
   }
 }
 
+TEST(RenderVolume, VoxelsThatAreNoCubesAgreeWithADenseWalk) {
+  const auto volume = scattered();
+  for (const VoxelShape& voxel : {VoxelShape{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 3}}}},
+                                  VoxelShape{{{{-1, 0, 0}, {0, 2, 0}, {0, 0, 1}}}},
+                                  VoxelShape{{{{1, 0, 0}, {0.5, 1, 0}, {0.2, -0.3, 1.5}}}}})
+    for (const auto projection : {Projection::kPerspective, Projection::kOrthographic}) {
+      RenderOptions o = optionsFor(volume, {.projection = projection, .voxel = voxel});
+      EXPECT_GE(agreement(volume, o), kAsked);
+    }
+}
+
+TEST(RenderVolume, CamerasThatAreFarAwaySeeTheVolume) {
+  const auto volume = scattered();
+  RenderOptions o = optionsFor(volume, {.projection = Projection::kOrthographic});
+  const Vec3 back = difference(o.camera.eye, o.camera.center);
+  o.step = 0.1;
+  const Image near = renderVolume(volume, o);
+  for (const double times : {1e10, 1e18, 1e290}) {
+    RenderOptions far = o;
+    far.camera.eye = sum(o.camera.center, scaled(back, times));
+    EXPECT_LE(largestDifference(renderVolume(volume, far), near), 0.05) << times;
+    far.camera.projection = Projection::kPerspective;
+    far.camera.fov = 1e-13;
+    EXPECT_NO_THROW((void)renderVolume(volume, far)) << times;
+  }
+}
+
 TEST(RenderVolume, AgreesFromInside) {
   const auto volume = scattered();
   const CameraWish inside{.eye = Vec3{9, 10, 11}, .center = Vec3{40, 12, 20}, .fov = 90.0};

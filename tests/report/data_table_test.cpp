@@ -47,6 +47,18 @@ TEST(Markdown, isATableUnderAHeading) {
             "| c\\|d | - | exact |\n");
 }
 
+TEST(Markdown, escapesTextOfUnknownOrigin) {
+  EXPECT_EQ(markdownText("a_b|c`<d>\\[e]*\nf\x1b"), "a\\_b\\|c\\`\\<d\\>\\\\\\[e\\]\\* f?");
+  EXPECT_EQ(markdownCode("plain"), "`plain`");
+  EXPECT_EQ(markdownCode("a `b`` c\n"), "``` a `b`` c? ```");
+  DataTable named = table();
+  named.title = "<b>\n# x";
+  named.rows[0][0] = std::string("[x](y)");
+  const std::string text = toMarkdown(named);
+  EXPECT_NE(text.find("## \\<b\\> \\# x\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("| \\[x\\](y) |"), std::string::npos) << text;
+}
+
 TEST(WithColumns, takesThemInTheirOrder) {
   const DataTable some = withColumns(table(), {"psnr", "name"});
   ASSERT_EQ(some.columns.size(), 2u);

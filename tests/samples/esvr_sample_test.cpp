@@ -143,7 +143,7 @@ TEST(EsvrSample, leavesNothingWhenInterrupted) {
   const auto run =
       test::runInterrupted(ESVR_SAMPLE, {"plume", folder / "a.vdb", "--resolution", "6000"});
   EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, HasSubstr("cancelled"));
+  EXPECT_THAT(run.err, HasSubstr("interrupted; nothing was written"));
   EXPECT_THAT(folder.names(), IsEmpty());
 }
 

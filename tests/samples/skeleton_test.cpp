@@ -72,13 +72,6 @@ INSTANTIATE_TEST_SUITE_P(
                            "ELF\x02\x01 binary\n",
                            "line 1", "7 columns"}));
 
-TEST(ReadSwc, refusesWhatCannotBeRead) {
-  EXPECT_THAT(
-      [] { (void)readSwc("/nowhere/a.swc"); },
-      ThrowsMessage<BadInput>(AllOf(HasSubstr("/nowhere/a.swc"), HasSubstr("No such file"))));
-  EXPECT_THAT([] { (void)readSwc("/"); }, ThrowsMessage<BadInput>(HasSubstr("directory")));
-}
-
 TEST(TubesOf, linkEveryNodeToItsParentAndKeepLonelyNodesAsBalls) {
   const auto tubes =
       tubesOf(parse("1 0 0 0 0 3 -1\n2 0 5 0 0 1 1\n3 0 5 5 0 1 2\n4 0 9 9 9 2 -1\n"));

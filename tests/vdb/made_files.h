@@ -23,6 +23,20 @@ void saveCompressed(const std::filesystem::path& path, const openvdb::GridPtrVec
 /// Reads one grid with OpenVDB's own reader.
 openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string& name);
 
+/// The inactive values of a tree that are not its background, as OpenVDB iterates over them.
+template <class Grid>
+InactiveValues inactiveIn(const Grid& grid) {
+  InactiveValues found;
+  for (auto value = grid.cbeginValueOff(); value; ++value) {
+    if (*value == grid.background()) continue;
+    openvdb::CoordBBox box;
+    value.getBoundingBox(box);
+    const auto corner = [](const openvdb::Coord& c) { return Coord{c.x(), c.y(), c.z()}; };
+    found.add(double(*value), Box{corner(box.min()), corner(box.max())});
+  }
+  return found;
+}
+
 std::vector<std::byte> bytesOf(const std::filesystem::path& path);
 void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
 

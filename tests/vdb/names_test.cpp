@@ -32,6 +32,11 @@ openvdb::GridPtrVec gridsNamed(const std::vector<std::string>& names) {
   return grids;
 }
 
+/// Names of grids in a file and their unique names.
+struct Order {
+  std::vector<std::string> names, unique;
+};
+
 class Names : public testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path path() const { return directory_ / "in.vdb"; }
@@ -55,7 +60,7 @@ TEST_F(Names, StandInFileOrder) {
 TEST_F(Names, SharedByGridsAreNumberedFromZero) {
   test::save(path(), gridsNamed({"a", "b", "a", "a"}));
   EXPECT_THAT(uniqueNames(), ElementsAre("a[0]", "b", "a[1]", "a[2]"));
-  EXPECT_EQ(mark("a"), 1.0f);
+  EXPECT_THAT([&] { (void)mark("a"); }, ThrowsMessage<BadInput>(HasSubstr("has 3 grids \"a\"")));
   EXPECT_EQ(mark("a[0]"), 1.0f);
   EXPECT_EQ(mark("a[1]"), 3.0f);
   EXPECT_EQ(mark("a[2]"), 4.0f);
@@ -64,10 +69,11 @@ TEST_F(Names, SharedByGridsAreNumberedFromZero) {
 
 TEST_F(Names, MayBeEmpty) {
   test::save(path(), gridsNamed({""}));
-  EXPECT_THAT(uniqueNames(), ElementsAre(""));
+  EXPECT_THAT(uniqueNames(), ElementsAre("(unnamed)"));
   EXPECT_EQ(mark(""), 1.0f);
+  EXPECT_EQ(mark("(unnamed)"), 1.0f);
   test::save(path(), gridsNamed({"", "", "x"}));
-  EXPECT_THAT(uniqueNames(), ElementsAre("[0]", "[1]", "x"));
+  EXPECT_THAT(uniqueNames(), ElementsAre("(unnamed)[0]", "(unnamed)[1]", "x"));
   EXPECT_EQ(mark("[1]"), 2.0f);
   EXPECT_EQ(readGrid(path(), "[1]").descriptor.name, "");
 }
@@ -76,6 +82,38 @@ TEST_F(Names, MayLookNumbered) {
   test::save(path(), gridsNamed({"a[1]", "b"}));
   EXPECT_THAT(uniqueNames(), ElementsAre("a[1]", "b"));
   EXPECT_EQ(mark("a[1]"), 1.0f);
+}
+
+/// OpenVDB's own look-up finds "a[1]" for the grid of this very name and for the second "a".
+TEST_F(Names, ThatLookNumberedWinAndNoGridIsTakenForAnother) {
+  const std::vector<Order> orders{{{"a", "a", "a[1]"}, {"a[0]", "a#2", "a[1]"}},
+                                  {{"a[0]", "a", "a"}, {"a[0]", "a#2", "a[1]"}}};
+  for (const auto& [names, unique] : orders) {
+    test::save(path(), gridsNamed(names));
+    EXPECT_EQ(uniqueNames(), unique);
+    for (std::size_t g = 0; g < unique.size(); ++g) {
+      EXPECT_EQ(mark(unique[g]), float(g + 1));
+      EXPECT_EQ(valueAt(readGrid(path(), g).volume, {0, 0, 0}), float(g + 1));
+    }
+  }
+}
+
+/// A written file has no grid that OpenVDB finds for the name of another.
+TEST_F(Names, OfWrittenGridsAreToldApartByOpenVdb) {
+  std::vector<VolumeGrid> grids;
+  for (const char* name : {"a", "a", "a[1]"})
+    grids.push_back(test::gridOf(name, {{{0, 0, 0}, float(grids.size() + 1)}}));
+  writeGrids(path(), {}, grids);
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    EXPECT_EQ(valueAt(readGrid(path(), g).volume, {0, 0, 0}), float(g + 1));
+  const auto found = openvdb::gridPtrCast<openvdb::FloatGrid>(test::load(path(), "a[1]"));
+  EXPECT_EQ(found->tree().getValue({0, 0, 0}), 3.0f);
+}
+
+TEST_F(Names, OfPlacesThatAreNotThereAreRefused) {
+  test::save(path(), gridsNamed({"a", "b"}));
+  EXPECT_THAT([&] { (void)readGrid(path(), std::size_t{2}); },
+              ThrowsMessage<BadInput>(HasSubstr("has no grid number 3, only 2 grids")));
 }
 
 TEST_F(Names, AreListedForAnUnknownName) {

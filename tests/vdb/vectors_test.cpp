@@ -104,7 +104,8 @@ TYPED_TEST(VectorFile, WithANumberThatIsNotFiniteNamesComponentAndVoxel) {
   EXPECT_THAT([&] { (void)readVector(this->path("in.vdb"), "wind"); },
               ThrowsMessage<BadInput>(
                   AllOf(HasSubstr("\"wind.y\""), HasSubstr("the first is at (5, 6, 7)"))));
-  const VectorGrid wind = readVector(this->path("in.vdb"), "wind", {.nonFinite = NonFinite::kZero});
+  const VectorGrid wind =
+      readVector(this->path("in.vdb"), "wind", {.nonFinite = NonFinite::kValue});
   EXPECT_EQ(wind.nonFiniteReplaced, 1u);
   EXPECT_EQ(valueAt(wind.components[1], {5, 6, 7}), 0.0f);
 }

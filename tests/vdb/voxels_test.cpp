@@ -10,6 +10,7 @@
 #include <thread>
 
 #include "esvr/error.h"
+#include "esvr/memory_limit.h"
 #include "support/non_finite.h"
 #include "vdb/expect_same.h"
 #include "vdb/made_files.h"
@@ -74,6 +75,7 @@ class EveryPacking : public testing::TestWithParam<Packing> {
     const auto grid = readGrid(directory / "in.vdb", "density");
     EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());
     EXPECT_EQ(grid.descriptor.background, 2.0);
+    EXPECT_EQ(grid.inactive, test::inactiveIn(*source));
     for (auto voxel = source->cbeginValueAll(); voxel; ++voxel) {
       if (!voxel.isVoxelValue()) continue;
       const auto at = voxel.getCoord();
@@ -137,6 +139,63 @@ TEST_F(Voxels, InactiveVoxelsReadAsBackgroundWhateverTheyHold) {
   EXPECT_EQ(valueAt(grid.volume, {2, 2, 2}), 0.125f);
   EXPECT_EQ(valueAt(grid.volume, {3, 3, 3}), 0.125f);
   EXPECT_EQ(valueAt(grid.volume, {1, 2, 4}), 0.5f);
+  EXPECT_EQ(grid.inactive.count(), 2u);
+  EXPECT_EQ(grid.inactive.nonFinite(), 1u);
+}
+
+TEST_F(Voxels, InactiveTilesOfEveryLevelAndLeavesWithoutActiveVoxelsAreCounted) {
+  auto source = test::smallGrid();
+  source->tree().addTile(1, {8, 0, 0}, 3.0f, false);
+  source->tree().addTile(2, {256, 0, 0}, 4.0f, false);
+  source->tree().addTile(3, {8192, 0, 0}, -5.0f, false);
+  source->tree().addTile(3, {-4096, 0, 0}, 0.0f, false);  // the background
+  source->tree().touchLeaf({0, 64, 0})->fill(2.0f, false);
+  const auto grid = saveAndRead(source);
+  const std::uint64_t side = 4096;
+  EXPECT_EQ(grid.inactive.count(), 512u + 128u * 128u * 128u + side * side * side + 512u);
+  EXPECT_EQ(grid.inactive.min(), -5.0);
+  EXPECT_EQ(grid.inactive.max(), 4.0);
+  EXPECT_EQ(grid.inactive, test::inactiveIn(*source));
+}
+
+TEST_F(Voxels, InactiveValuesAreTheSameWhateverTheTiles) {
+  auto tiles = test::smallGrid(), voxels = test::smallGrid();
+  tiles->tree().addTile(2, {128, 0, 0}, 3.0f, false);
+  voxels->tree().addTile(2, {128, 0, 0}, 3.0f, false);
+  voxels->tree().touchLeaf({136, 8, 0});
+  EXPECT_EQ(saveAndRead(tiles).inactive, saveAndRead(voxels).inactive);
+}
+
+// Where the signs around the empty space agree, a writer's flood fill makes the inside of a level
+// set negative. Other values, or negative ones that it does not make, are lost.
+TEST_F(Voxels, TheInsideOfALevelSetIsLostOnlyIfAWriterDoesNotRestoreIt) {
+  auto sphere = openvdb::tools::createLevelSetSphere<FloatGrid>(12.0f, {0, 0, 0}, 1.0f);
+  EXPECT_EQ(saveAndRead(sphere).inactive.count(), 0u);
+  auto island = sphere->deepCopy();  // nothing around it says that it is inside
+  island->tree().addTile(2, {1280, 0, 0}, -sphere->background(), false);
+  EXPECT_EQ(saveAndRead(island).inactive.count(), 128u * 128u * 128u);
+  for (auto value = sphere->beginValueOff(); value; ++value)
+    if (*value < 0.0f) value.setValue(-2.0f);
+  const auto inside = saveAndRead(sphere).inactive;
+  EXPECT_GT(inside.count(), 0u);
+  EXPECT_EQ(inside.min(), -2.0);
+  EXPECT_EQ(inside.max(), -2.0);
+  auto plane = test::smallGrid(3.0f);  // a single voxel surrounds nothing
+  plane->setGridClass(openvdb::GRID_LEVEL_SET);
+  plane->tree().setValueOff({5, 5, 5}, -3.0f);
+  plane->tree().addTile(3, {4096, 0, 0}, -3.0f, false);
+  EXPECT_GE(saveAndRead(plane).inactive.count(), std::uint64_t{1} << 36);
+}
+
+TEST_F(Voxels, NoRoomOnTheDiskIsNoticedBeforeTilesAreExpanded) {
+  auto source = test::smallGrid();
+  for (int x = 1; x <= 64; ++x) source->tree().addTile(3, {4096 * x, 0, 0}, 1.0f, true);
+  test::save(path(), {source});
+  const ReadOptions options{.maxBytes = kNoMemoryLimit,
+                            .memory = VoxelMemory({directory_ / "", 1u << 20, 1u << 20})};
+  EXPECT_THAT([&] { (void)readGrid(path(), "density", options); },
+              ThrowsMessage<MemoryExceeded>(
+                  AllOf(HasSubstr("density"), HasSubstr("GB of files in"), HasSubstr("free"))));
 }
 
 TEST_F(Voxels, LeavesWithoutAnActiveVoxelAreDropped) {
@@ -185,17 +244,28 @@ TEST_F(Voxels, NonFiniteOnesBecomeZeroWhenAsked) {
   auto source = test::smallGrid(0.5f);
   source->tree().setValue({9, 1, 1}, kNan);
   source->tree().addTile(1, {64, 0, 0}, kInf, true);
-  const auto grid = saveAndRead(source, {.nonFinite = NonFinite::kZero});
+  const auto grid = saveAndRead(source, {.nonFinite = NonFinite::kValue});
   EXPECT_EQ(grid.nonFiniteReplaced, 1u + 512u);
   EXPECT_EQ(valueAt(grid.volume, {9, 1, 1}), 0.0f);
   EXPECT_EQ(valueAt(grid.volume, {64, 0, 0}), 0.0f);
   EXPECT_EQ(activeVoxelCount(grid.volume), source->activeVoxelCount());
 }
 
+TEST_F(Voxels, NonFiniteOnesBecomeAValueOrTheBackgroundWhenAsked) {
+  auto source = test::smallGrid(0.5f);
+  source->tree().setValue({9, 1, 1}, kNan);
+  source->tree().addTile(1, {64, 0, 0}, kInf, true);
+  const auto background = saveAndRead(source, {.nonFinite = NonFinite::kBackground});
+  EXPECT_EQ(background.nonFiniteReplaced, 1u + 512u);
+  EXPECT_EQ(valueAt(background.volume, {9, 1, 1}), 0.5f);
+  const auto value = saveAndRead(source, {.nonFinite = NonFinite::kValue, .nonFiniteValue = -2.0f});
+  EXPECT_EQ(valueAt(value.volume, {64, 0, 0}), -2.0f);
+}
+
 TEST_F(Voxels, ABackgroundThatIsNotFiniteIsRefused) {
   const auto source = test::smallGrid(kInf);
   EXPECT_THROW((void)saveAndRead(source), BadInput);
-  EXPECT_THROW((void)saveAndRead(source, {.nonFinite = NonFinite::kZero}), BadInput);
+  EXPECT_THROW((void)saveAndRead(source, {.nonFinite = NonFinite::kValue}), BadInput);
 }
 
 TEST_F(Voxels, DoublesAreNarrowedToTheNearestFloat) {

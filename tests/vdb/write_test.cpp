@@ -52,14 +52,58 @@ TEST_F(Write, InactiveVoxelsHoldTheBackground) {
 }
 
 TEST_F(Write, ConstantLeavesBecomeTilesUnlessToldOtherwise) {
-  const auto grid = test::gridOf("density", fullBrick({8, 16, -8}, 0.75f));
+  auto voxels = fullBrick({8, 16, -8}, 0.75f);
+  voxels.push_back({{0, 0, 0}, 2.0f});
+  const auto grid = test::gridOf("density", voxels);
   const auto tiled = writeAndLoad(grid);
-  EXPECT_EQ(tiled->tree().leafCount(), 0u);
-  EXPECT_EQ(tiled->activeVoxelCount(), 512u);
+  EXPECT_EQ(tiled->tree().leafCount(), 1u);
+  EXPECT_EQ(tiled->activeVoxelCount(), 513u);
   EXPECT_EQ(tiled->tree().getValue({15, 23, -1}), 0.75f);
   test::expectSameBits(readGrid(path(), "density").volume, grid.volume);
   const auto leaves = writeAndLoad(grid, {.overwrite = true, .constantTiles = false});
-  EXPECT_EQ(leaves->tree().leafCount(), 1u);
+  EXPECT_EQ(leaves->tree().leafCount(), 2u);
+}
+
+// Blender draws nothing of a grid without a leaf.
+TEST_F(Write, LeavesRemainWhereAllVoxelsWouldBeInTiles) {
+  auto voxels = fullBrick({8, 16, -8}, 0.75f);
+  const auto more = fullBrick({16, 16, -8}, 0.75f);
+  voxels.insert(voxels.end(), more.begin(), more.end());
+  for (const GridClass gridClass : {GridClass::kFogVolume, GridClass::kLevelSet}) {
+    auto grid = test::gridOf("density", voxels);
+    grid.descriptor.gridClass = gridClass;
+    const auto back = writeAndLoad(grid, {.overwrite = true});
+    EXPECT_EQ(back->tree().leafCount(), 2u);
+    EXPECT_EQ(back->activeVoxelCount(), 1024u);
+    test::expectSameBits(readGrid(path(), "density").volume, grid.volume);
+  }
+}
+
+TEST_F(Write, AMergedTileOfManyBricksKeepsALeafToo) {
+  std::vector<test::VoxelValue> voxels;
+  for (int brick = 0; brick < 4096; ++brick) {
+    const Coord corner = Coord{brick / 256, brick / 16 % 16, brick % 16} * kBrickSide;
+    const auto more = fullBrick(corner, 0.5f);
+    voxels.insert(voxels.end(), more.begin(), more.end());
+  }
+  const auto back = writeAndLoad(test::gridOf("density", voxels));
+  EXPECT_EQ(back->tree().leafCount(), 1u);
+  EXPECT_EQ(back->activeVoxelCount(), 128u * 128u * 128u);
+}
+
+TEST_F(Write, DoublesThatWereSavedAsHalfAreRoundedOnlyIfNothingIsLost) {
+  for (const float value : {0.25f, 0.1f}) {
+    auto source = openvdb::DoubleGrid::create();
+    source->setName("density");
+    source->tree().setValue({1, 2, 3}, 0.25);
+    source->setSaveFloatAsHalf(true);
+    test::save(path(), {source});
+    VolumeGrid grid = readGrid(path(), "density");
+    grid.volume.brickValues(0)[voxelOffset({1, 2, 3})] = value;
+    writeGrids(path(), {}, {&grid, 1}, {.overwrite = true});
+    EXPECT_EQ(inspectVdb(path()).grids.front().savedAsHalf, value == 0.25f);
+    EXPECT_EQ(valueAt(readGrid(path(), "density").volume, {1, 2, 3}), value);
+  }
 }
 
 TEST_F(Write, LeavesWithoutActiveVoxelsAreNotWritten) {

@@ -14,7 +14,7 @@ from .jobs import Job, JobFailed
 from .modal import JobOperator
 from .preferences import absolute
 from .properties import remember
-from .source import EXTENSION, Source, SourceError, grouped
+from .source import EXTENSION, Source, SourceError, grouped, text_of_gaps
 
 
 def decode_all(job, requests):
@@ -29,12 +29,26 @@ def decoded_or_failure(job, request):
         return failure
 
 
+def report_gaps(operator, source, entry):
+    """Blender shows nothing in a missing frame, and its own import ends at the first one."""
+    text = text_of_gaps(source.stem, entry.frames or [])
+    if text:
+        operator.report({"WARNING"}, text)
+
+
 def report_failures(operator, results):
     """Reports the failures among results of decode_all(). Returns whether there is an entry."""
     failures = [result for result in results if isinstance(result, JobFailed)]
     for failure in failures:
         operator.report({"ERROR"}, str(failure))
     return len(failures) < len(results)
+
+
+def report_left_out(operator, request):
+    """Warns of files that look like frames of the source and are none."""
+    hint = request.source.hint(request.settings.frames)
+    if hint:
+        operator.report({"WARNING"}, hint)
 
 
 class ImportESVR(JobOperator, bpy.types.Operator, ImportHelper):
@@ -76,6 +90,8 @@ class ImportESVR(JobOperator, bpy.types.Operator, ImportHelper):
         for request, entry in zip(self._requests, result):
             if not isinstance(entry, JobFailed):
                 add_volume(context, request, entry)
+                report_gaps(self, request.source, entry)
+                report_left_out(self, request)
         return report_failures(self, result)
 
     def _paths(self):
@@ -123,6 +139,8 @@ class ReloadESVR(JobOperator, bpy.types.Operator):
                 self.report({"ERROR"}, f"{volume.name}: {error}")
         if not requests:
             return {"FINISHED"}
+        for request in requests.values():
+            report_left_out(self, request)
         self._changed = list(requests)  # names, because a volume may be removed in the meantime
         return self.run(context, Job(lambda job: decode_all(job, requests.values())))
 

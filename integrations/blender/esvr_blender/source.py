@@ -36,16 +36,32 @@ class Source:
 
     def numbered_files(self):
         """The paths of the files that belong to the pattern, by their numbers."""
+        return self._listing()[0]
+
+    def hint(self, frames=None):
+        """Says which files look like frames, are none, and are left out; empty if there are none."""
+        others = [entry for number, entry in self._listing()[1] if within(number, frames)] if self.is_numbered else []
+        if not others:
+            return ""
+        more = f" and {len(others) - 1} more" if len(others) > 1 else ""
+        return (f"{os.path.basename(self.text)}: {min(others)}{more} looked like a frame and was left out: it has another "
+                "number of digits, a negative number, which Blender does not show, or one with a fraction")
+
+    def _listing(self):
+        """The files of the pattern by their numbers, and (number, name) of those that look like them."""
         folder, name = os.path.split(self.text)
         match = PATTERN.match(name)
         width = width_of(match["places"])
-        found = {}
+        found, others = {}, []
         for entry in os.listdir(folder) if os.path.isdir(folder) else []:
             digits = entry[len(match["head"]):len(entry) - len(match["tail"])]
-            if (entry == match["head"] + digits + match["tail"] and re.fullmatch("[0-9]+", digits)
-                    and digits == str(int(digits)).zfill(width)):
+            if entry != match["head"] + digits + match["tail"] or not re.fullmatch(r"-?[0-9]+(\.[0-9]+)?", digits):
+                continue
+            if re.fullmatch("[0-9]+", digits) and digits == str(int(digits)).zfill(width):
                 found[int(digits)] = os.path.join(folder, entry)
-        return found
+            else:
+                others.append((float(digits), entry))
+        return found, others
 
     def files(self, frames=None):
         """All paths by their numbers; {None: path} for a single file. `frames` is (first, last) or None.
@@ -71,6 +87,20 @@ def width_of(places):
 
 def within(number, frames):
     return frames is None or frames[0] <= number <= frames[1]
+
+
+def gaps_in(frames):
+    """The first and the last of the missing frames between increasing numbers, for each gap."""
+    return [(before + 1, after - 1) for before, after in zip(frames, frames[1:]) if after > before + 1]
+
+
+def text_of_gaps(stem, frames):
+    """What the user should know about missing frames; empty if there is no gap."""
+    gaps = ", ".join(str(first) if first == last else f"{first} to {last}" for first, last in gaps_in(frames))
+    if not gaps:
+        return ""
+    return (f"{stem}: nothing is shown in the missing frames {gaps}. --missing hold of vdb2esvr and esvr2vdb repeats "
+            "the frame before a gap")
 
 
 def in_frames(frames):

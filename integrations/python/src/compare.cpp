@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "esvr/metrics.h"
+#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -22,8 +23,7 @@ VolumeMetrics compare(const Side& reference, const Side& candidate,
   const Volume a = voxelsOf(reference), b = voxelsOf(candidate);
   CompareOptions options{.peak = peak, .ssim = ssim};
   if (box) options.box = boxOf(*box);
-  const py::gil_scoped_release release;
-  return compareVolumes(a.grid->volume, b.grid->volume, options);
+  return interruptible([&] { return compareVolumes(a.grid->volume, b.grid->volume, options); });
 }
 
 }  // namespace
@@ -51,7 +51,8 @@ void addCompare(py::module_& module) {
       "compare", &compare, py::arg("reference"), py::arg("candidate"), py::kw_only(),
       py::arg("box") = py::none(), py::arg("peak") = py::none(), py::arg("ssim") = false,
       "Compares two volumes or grids; grids are decoded. The box is that of the reference's\n"
-      "active voxels by default, and the peak its largest value.");
+      "active voxels by default, and the peak the range of its values, which is the largest value\n"
+      "of a density (docs/compare.md).");
 }
 
 }  // namespace esvr::python

@@ -6,7 +6,9 @@
 #include <mutex>
 
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "esvr/sequence_file.h"
+#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -23,14 +25,22 @@ std::vector<Grid> gridsOf(const File& self) {
   return grids;
 }
 
+/// The names of the grids, separated by commas.
+std::string listed(const File& self) {
+  std::string names;
+  for (const auto& name : namesOfStored(*self.file)) names += (names.empty() ? "" : ", ") + name;
+  return names;
+}
+
 Grid gridNamed(const File& self, const std::string& name) {
-  std::string known;
-  for (std::size_t g = 0; g < self.file->grids.size(); ++g) {
-    const std::string& other = self.file->grids[g].descriptor.name;
-    if (other == name) return gridOf(self, g);
-    known += (known.empty() ? "" : ", ") + other;
+  try {
+    return gridOf(self, findStored(*self.file, name));
+  } catch (const BadInput& error) {
+    const GridNames all(namesInOrder(*self.file));
+    if (all.isAmbiguous(name) || all.lookUp(name))
+      throw py::key_error("the file " + std::string(error.what()));
+    throw py::key_error("there is no grid '" + shownName(name) + "'; there are: " + listed(self));
   }
-  throw py::key_error("there is no grid '" + name + "'; there are: " + known);
 }
 
 std::vector<std::string> carriedNames(const File& self) {
@@ -43,6 +53,7 @@ struct Part {
   std::optional<PlainBox> box;
   std::optional<std::size_t> ellipsoids;
   std::optional<std::int64_t> frame;
+  ReadLimits limits{};
 
   [[nodiscard]] bool isWhole() const { return !box && !ellipsoids; }
 };
@@ -50,23 +61,26 @@ struct Part {
 EsvrFile readFrame(const std::filesystem::path& path, const Part& part) {
   if (!part.isWhole())
     throw UsageError(path.string() + ": frames of a sequence are read as a whole");
-  return SequenceReader(path).read(*part.frame);
+  return SequenceReader(path, part.limits).read(*part.frame);
 }
 
 EsvrFile readPart(const std::filesystem::path& path, const Part& part) {
   if (part.frame) return readFrame(path, part);
   if (holdsSequence(path))
     throw UsageError(path.string() + ": the file holds a sequence; name a frame (esvr.frames)");
-  if (part.isWhole()) return readEsvr(path);
-  ReadPart wanted{.ellipsoids = part.ellipsoids};
+  if (part.isWhole()) return readEsvr(path, part.limits);
+  ReadPart wanted{.ellipsoids = part.ellipsoids, .limits = part.limits};
   if (part.box) wanted.box = boxOf(*part.box);
   return readEsvrPart(path, wanted).file;
 }
 
 File read(const std::filesystem::path& path, const std::optional<PlainBox>& box,
-          const std::optional<std::size_t>& ellipsoids, const std::optional<std::int64_t>& frame) {
-  const py::gil_scoped_release release;
-  return {std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame}))};
+          const std::optional<std::size_t>& ellipsoids, const std::optional<std::int64_t>& frame,
+          const std::optional<std::uint64_t>& maxMemory) {
+  return interruptible([&] {
+    const ReadLimits limits{.maxBytes = memoryLimit(maxMemory)};
+    return File{std::make_shared<const EsvrFile>(readPart(path, {box, ellipsoids, frame, limits}))};
+  });
 }
 
 std::vector<std::int64_t> numbersOf(const SequenceReader& reader) {
@@ -76,46 +90,47 @@ std::vector<std::int64_t> numbersOf(const SequenceReader& reader) {
 }
 
 std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
-  const py::gil_scoped_release release;
-  if (!holdsSequence(path)) return {};
-  return numbersOf(SequenceReader(path));
+  return interruptible([&]() -> std::vector<std::int64_t> {
+    if (!holdsSequence(path)) return {};
+    return numbersOf(SequenceReader(path));
+  });
 }
 
 /// A reader that threads of Python may share.
 struct Sequence {
-  explicit Sequence(const std::filesystem::path& path) : reader(path) {}
+  Sequence(const std::filesystem::path& path, std::uint64_t maxBytes)
+      : reader(path, {.maxBytes = maxBytes}) {}
 
   SequenceReader reader;
   std::mutex reads;
 };
 
 File readOfSequence(Sequence& self, std::int64_t frame) {
-  const py::gil_scoped_release release;
-  const std::lock_guard lock(self.reads);
-  return {std::make_shared<const EsvrFile>(self.reader.read(frame))};
+  return interruptible([&] {
+    const std::lock_guard lock(self.reads);
+    return File{std::make_shared<const EsvrFile>(self.reader.read(frame))};
+  });
 }
 
 std::uint64_t writeFile(const std::filesystem::path& path, const File& file, bool overwrite) {
-  const py::gil_scoped_release release;
-  return writeEsvr(path, *file.file, {.overwrite = overwrite});
+  return interruptible([&] { return writeEsvr(path, *file.file, {.overwrite = overwrite}); });
 }
 
 std::uint64_t writeGridList(const std::filesystem::path& path, const std::vector<Grid>& grids,
                             bool overwrite) {
-  const py::gil_scoped_release release;
-  EsvrFile file;
-  for (const Grid& grid : grids) {
-    file.grids.push_back(*grid.grid);
-    // The other grid may not be there. It only made the voxels smaller.
-    file.grids.back().reference.reset();
-  }
-  return writeEsvr(path, file, {.overwrite = overwrite});
+  return interruptible([&] {
+    EsvrFile file;
+    for (const Grid& grid : grids) {
+      file.grids.push_back(*grid.grid);
+      // The other grid may not be there. It only made the voxels smaller.
+      file.grids.back().reference.reset();
+    }
+    return writeEsvr(path, file, {.overwrite = overwrite});
+  });
 }
 
 std::string fileText(const File& self) {
-  std::string names;
-  for (const auto& grid : self.file->grids)
-    names += (names.empty() ? "" : ", ") + grid.descriptor.name;
+  const std::string names = listed(self);
   return "<esvr.File: " + (names.empty() ? "no grid" : names) + ">";
 }
 
@@ -124,16 +139,25 @@ std::string fileText(const File& self) {
 void addFiles(py::module_& module) {
   py::class_<File>(module, "File", "The content of an .esvr file.")
       .def_property_readonly("grids", &gridsOf, "The grids in their order (list of esvr.Grid).")
+      .def_property_readonly(
+          "names", [](const File& self) { return namesOfStored(*self.file); },
+          "The names by which file[name] finds each of the grids. They are unique, unlike "
+          "Grid.name:\n"
+          "\"density[1]\" is the second grid of a name, \"vel.x\" a component of the vectors "
+          "\"vel\".")
       .def_property_readonly("carried", &carriedNames,
                              "Names of the grids that are kept as the bytes of their .vdb file.")
-      .def("__getitem__", &gridNamed, py::arg("name"), "The first grid of a name.")
+      .def("__getitem__", &gridNamed, py::arg("name"),
+           "The grid of a name, as --grid of the programs finds it. KeyError: there is none, or\n"
+           "several grids have the name; one of File.names tells them apart.")
       .def(
           "save",
           [](const File& file, const std::filesystem::path& path,
              const std::optional<PlainBox>& box, const std::optional<std::size_t>& layers,
              const std::optional<std::size_t>& maxEllipsoids, bool overwrite) {
-            const py::gil_scoped_release release;
-            return saveFile(file, path, {box, layers, maxEllipsoids}, overwrite);
+            return interruptible([&] {
+              return saveFile(file, path, {box, layers, maxEllipsoids}, overwrite);
+            });
           },
           py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
           py::arg("layers") = py::none(), py::arg("max_ellipsoids") = py::none(),
@@ -148,11 +172,13 @@ void addFiles(py::module_& module) {
       module, "Sequence",
       "A file that holds a sequence. Reading its frames in their order decodes each\n"
       "of them once; esvr.read(path, frame=...) decodes those before it again.")
-      .def(py::init([](const std::filesystem::path& path) {
+      .def(py::init([](const std::filesystem::path& path,
+                       const std::optional<std::uint64_t>& maxMemory) {
              const py::gil_scoped_release release;
-             return std::make_unique<Sequence>(path);
+             return std::make_unique<Sequence>(path, memoryLimit(maxMemory));
            }),
-           py::arg("path"))
+           py::arg("path"), py::kw_only(), py::arg("max_memory") = py::none(),
+           "max_memory is that of esvr.read.")
       .def_property_readonly(
           "frames", [](const Sequence& s) { return numbersOf(s.reader); },
           "The numbers of the frames, which increase.")
@@ -160,9 +186,13 @@ void addFiles(py::module_& module) {
   module.def(
       "read", &read, py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
       py::arg("ellipsoids") = py::none(), py::arg("frame") = py::none(),
+      py::arg("max_memory") = py::none(),
       "Reads an .esvr file, or a part of it.\n\n"
       "box selects the ellipsoids that reach ((x0, y0, z0), (x1, y1, z1)); ellipsoids is the\n"
-      "number that a level of detail should have at least; frame is one of esvr.frames(path).");
+      "number that a level of detail should have at least; frame is one of esvr.frames(path).\n"
+      "max_memory is a limit on the bytes that the content may take in memory, which may be many\n"
+      "times those of the file (default: half of the memory of the machine); above it, a\n"
+      "MemoryError is raised.");
   module.def("frames", &framesOf, py::arg("path"),
              "The numbers of the frames of a sequence; an empty list for a file of one frame.");
   module.def("write", &writeFile, py::arg("path"), py::arg("file"), py::kw_only(),

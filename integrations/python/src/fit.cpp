@@ -7,6 +7,7 @@
 
 #include "esvr/convert.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "python/src/interruptible.h"
 
 namespace esvr::python {
@@ -96,8 +97,10 @@ Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progre
   Reporter reporter(progress, token);
   ConvertOptions reporting = options;
   if (progress) reporting.fit.progress = std::ref(reporter);
-  auto running = std::async(std::launch::async,
-                            [&] { return convertWith(volume, std::move(reporting), token); });
+  auto running = std::async(std::launch::async, [&] {
+    const CancelScope scope(&token);
+    return convertWith(volume, std::move(reporting), token);
+  });
   Conversion conversion;
   try {
     conversion = waitFor(running, token);
@@ -107,15 +110,25 @@ Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progre
   }
   reporter.rethrow();
   if (conversion.fit.end == FitEnd::kPsnrMissed)
-    throw TargetMissed("grid '" + volume.grid->descriptor.name + "': the PSNR is out of reach");
+    throw TargetMissed("grid '" + shownName(volume.grid->descriptor.name) +
+                       "': the PSNR is out of reach");
   return {std::make_shared<const StoredGrid>(std::move(conversion.grid))};
+}
+
+/// Warns of what a grid without loss does not hold.
+void tellLostValues(const Volume& volume) {
+  const InactiveValues& inactive = volume.grid->inactive;
+  if (inactive.count() == 0) return;
+  const std::string text = "grid '" + volume.grid->descriptor.name + "' loses " + toText(inactive) +
+                           "; the program vdb2esvr keeps them with --lossless or --keep";
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
 }
 
 constexpr const char* kFitText =
     "Converts a volume to a Grid. One of the goals may be given:\n\n"
     "psnr: the smallest grid of this PSNR over the box, dB; max_error: a bound on the error of\n"
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
-    "lossless: every voxel bit for bit. The default is the quality of the preset ('draft',\n"
+    "lossless: every active voxel bit for bit. The default is the quality of the preset ('draft',\n"
     "'standard' or 'high'), over the active voxels.\n\n"
     "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. fit_for:\n"
     "'voxels', or 'drawing' for sums that are evaluated between voxels. device: 'auto', 'cpu',\n"
@@ -141,6 +154,7 @@ void addFit(py::module_& module) {
         options.fit.count = count;
         options.fit.seed = seed;
         options.fit.device = selectDevice(device);
+        if (lossless) tellLostValues(volume);
         return fitVolume(volume, options, progress);
       },
       py::arg("volume"), py::kw_only(), py::arg("psnr") = py::none(),

@@ -71,17 +71,18 @@ py::array_t<float> evaluate(const Grid& self, const Places& points) {
   const StoredGrid& grid = *self.grid;
   if (!followsFromEllipsoids(grid))
     throw UsageError(
-        "grid '" + grid.descriptor.name +
+        "grid '" + shownName(grid.descriptor.name) +
         "' stores voxels or a residual, so that there is no sum to evaluate; decode it "
         "with to_volume()");
   py::array_t<float> values(points.shape(0));
   const std::span places(reinterpret_cast<const Place*>(points.data()),
                          std::size_t(points.shape(0)));
   const std::span out(values.mutable_data(), places.size());
-  const py::gil_scoped_release release;
-  evaluatePlaces(grid.field, places, out);
-  if (const auto range = voxelRule(grid).range)
-    for (float& value : out) value = std::clamp(value, range->min, range->max);
+  interruptible([&] {
+    evaluatePlaces(grid.field, places, out);
+    if (const auto range = voxelRule(grid).range)
+      for (float& value : out) value = std::clamp(value, range->min, range->max);
+  });
   return values;
 }
 
@@ -93,7 +94,7 @@ std::string kindOf(const StoredGrid& grid) {
 std::string gridText(const Grid& self) {
   const StoredGrid& grid = *self.grid;
   const std::size_t ellipsoids = grid.field.ellipsoidCount();
-  std::string text = "<esvr.Grid '" + grid.descriptor.name + "': ";
+  std::string text = "<esvr.Grid '" + shownName(grid.descriptor.name) + "': ";
   text += grid.voxels ? "voxels" : std::to_string(ellipsoids) + " ellipsoids";
   return text + ", " + std::to_string(grid.activeVoxels) + " active voxels>";
 }
@@ -129,20 +130,24 @@ py::object matrixOf(const Transform& transform) {
   return matrix;
 }
 
-Volume decoded(const Grid& grid, const std::optional<PlainBox>& box) {
-  DecodeOptions options;
+Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
+               const std::optional<std::uint64_t>& maxMemory) {
+  DecodeOptions options{.maxBytes = memoryLimit(maxMemory)};
   if (box) options.box = boxOf(*box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
-  const py::gil_scoped_release release;
-  return {std::make_shared<const VolumeGrid>(
-      VolumeGrid{grid.grid->descriptor, decodeGrid(*grid.grid, options)})};
+  return interruptible([&] {
+    return Volume{std::make_shared<const VolumeGrid>(
+        VolumeGrid{grid.grid->descriptor, decodeGrid(*grid.grid, options)})};
+  });
 }
 
 void addGrid(py::module_& module) {
   addEllipsoids(module);
   py::class_<Grid>(module, "Grid", "A grid of an .esvr file: a sum of ellipsoids, or voxels.")
-      .def("to_volume", &decoded, py::arg("box") = py::none(),
-           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.")
+      .def("to_volume", &decoded, py::arg("box") = py::none(), py::kw_only(),
+           py::arg("max_memory") = py::none(),
+           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
+           "max_memory is that of esvr.read.")
       .def("evaluate", &evaluate, py::arg("points"),
            "The sum of the ellipsoids at points of shape (n, 3), in index coordinates: float32 of\n"
            "shape (n,). It is accurate between voxels if the grid was fitted for drawing.")
@@ -157,7 +162,8 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "kind", [](const Grid& g) { return kindOf(*g.grid); },
           "\"ellipsoids\", \"ellipsoids with a residual\" or \"voxels\".")
-      .def_property_readonly("background", [](const Grid& g) { return g.grid->field.background; })
+      .def_property_readonly("background",
+                             [](const Grid& g) { return float(g.grid->descriptor.background); })
       .def_property_readonly(
           "active_voxels", [](const Grid& g) { return g.grid->activeVoxels; },
           "Number of active voxels of the source.")

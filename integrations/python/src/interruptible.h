@@ -2,6 +2,7 @@
 /// Long calls that Ctrl-C ends.
 
 #include <future>
+#include <type_traits>
 #include <utility>
 
 #include "esvr/progress.h"
@@ -32,11 +33,19 @@ Result waitFor(std::future<Result>& call, CancelToken& token) {
   return call.get();
 }
 
-/// Runs a call that takes long on another thread. \param call  takes a CancelToken&
+/// Runs a call that takes long on another thread. The loops of the library look at the token, so that
+/// the call ends soon after Ctrl-C.
+/// \param call  takes a CancelToken& or nothing; it must not use objects of Python
 template <class Call>
 auto interruptible(const Call& call) {
   CancelToken token;
-  auto running = std::async(std::launch::async, [&] { return call(token); });
+  auto running = std::async(std::launch::async, [&] {
+    const CancelScope scope(&token);
+    if constexpr (std::is_invocable_v<Call, CancelToken&>)
+      return call(token);
+    else
+      return call();
+  });
   return waitFor(running, token);
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "esvr/container.h"
+#include "esvr/memory_limit.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::python {
@@ -20,6 +21,7 @@ namespace py = pybind11;
 /// esvr.Volume: voxels and the other properties of their grid. It does not change after it was made.
 struct Volume {
   std::shared_ptr<const VolumeGrid> grid;
+  std::uint64_t roundedValues = 0;  ///< active voxels whose number was rounded to a float
 };
 
 /// esvr.File: the content of an .esvr file.
@@ -33,6 +35,11 @@ struct Grid {
 };
 
 using Corner = std::array<std::int32_t, 3>;
+/// The limit that a caller gives, or the usual one.
+[[nodiscard]] inline std::uint64_t memoryLimit(const std::optional<std::uint64_t>& given) {
+  return given ? *given : usualMemoryLimit();
+}
+
 /// A box of voxels as Python has it: its first and its last voxel.
 using PlainBox = std::array<Corner, 2>;
 
@@ -64,7 +71,9 @@ std::vector<std::string> saveFile(const File& file, const std::filesystem::path&
 
 /// The voxels of a stored grid, with the GIL released.
 /// \throws UsageError  the box is empty
-[[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box);
+/// \throws MemoryExceeded  they need more than the limit
+[[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
+                             const std::optional<std::uint64_t>& maxMemory = std::nullopt);
 
 // Each adds its functions and classes to the module.
 void addErrors(py::module_& module);

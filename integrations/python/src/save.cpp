@@ -22,7 +22,7 @@ StoredGrid cut(StoredGrid grid, const SavedPart& part) {
 DecodeOptions decodeOptions(const SavedPart& part) {
   if (part.layers == 0u) throw UsageError("layers must be above 0");
   if (part.maxEllipsoids == 0u) throw UsageError("max_ellipsoids must be above 0");
-  DecodeOptions options;
+  DecodeOptions options{.maxBytes = usualMemoryLimit()};
   if (part.box) options.box = boxOf(*part.box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
   return options;

@@ -9,26 +9,61 @@
 
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
+#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
 namespace {
 
 using FloatArray = py::array_t<float, py::array::c_style | py::array::forcecast>;
+using FlagArray = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 
 /// Voxels of an array of Python, with z fastest.
 struct Dense {
   const float* values;
-  Coord side, origin;
+  const bool* masked;  ///< null: no element is masked
+  Coord side;
+  Box box;
 
-  [[nodiscard]] Box box() const { return {origin, origin + side - Coord{1, 1, 1}}; }
-  [[nodiscard]] float at(Coord voxel) const {
-    const Coord v = voxel - origin;
-    return values[(std::size_t(v.x) * side.y + v.y) * side.z + v.z];
+  [[nodiscard]] std::size_t placeOf(Coord voxel) const {
+    const Coord v = voxel - box.min;
+    return (std::size_t(v.x) * side.y + v.y) * side.z + v.z;
   }
 };
 
-Dense denseOf(const FloatArray& array, const Corner& origin) {
+/// An array of Python as numbers of this project.
+struct Numbers {
+  FloatArray values;
+  std::optional<FlagArray> masked;  ///< of a masked array: true for elements without a value
+  /// Elements, masked or not, whose float differs from the number. Integers have none.
+  py::array_t<bool> rounded;
+  bool areRounded = false;  ///< whether any element is rounded
+};
+
+std::string voxelIn(const py::array& flags, const Corner& origin) {
+  const py::object place =
+      py::module_::import("numpy").attr("argwhere")(flags).attr("__getitem__")(0);
+  std::string text;
+  for (int a = 0; a < 3; ++a)
+    text += (a == 0 ? "(" : ", ") +
+            std::to_string(origin[a] + place.attr("__getitem__")(a).cast<std::int64_t>());
+  return text + ")";
+}
+
+/// Refuses arrays of dates, records, text, objects and complex numbers, which NumPy would turn into
+/// floats that mean nothing.
+void requireNumbers(const py::array& array) {
+  const char kind = array.dtype().kind();
+  if (kind == 'c')
+    throw UsageError(
+        "the array has complex numbers; give one of array.real, array.imag and abs(array)");
+  if (std::string("biuf").find(kind) == std::string::npos)
+    throw UsageError("the array has elements of type " +
+                     py::str(array.dtype()).cast<std::string>() +
+                     ", and a volume has numbers; array.astype('float32') says what they are");
+}
+
+void requireShape(const py::array& array, const Corner& origin) {
   if (array.ndim() != 3)
     throw UsageError("the array has " + std::to_string(array.ndim()) +
                      " axes, and a volume has 3: x, y, z");
@@ -37,18 +72,75 @@ Dense denseOf(const FloatArray& array, const Corner& origin) {
     if (array.shape(a) == 0) throw UsageError("the array has no voxels");
     if (last > Box::kMax) throw UsageError("the array ends outside the index space");
   }
-  const auto side = [&](int a) { return std::int32_t(array.shape(a)); };
-  return {array.data(), {side(0), side(1), side(2)}, coordOf(origin)};
 }
 
-/// A voxel of the array is active if it differs from the background by more than the threshold.
+/// Converts an array to floats. Integers and elements that would become infinite must not change.
+Numbers numbersOf(const py::object& given, const Corner& origin) {
+  const py::module_ numpy = py::module_::import("numpy");
+  const py::object ma = numpy.attr("ma");
+  Numbers numbers;
+  if (py::isinstance(given, ma.attr("MaskedArray")))
+    numbers.masked = FlagArray(ma.attr("getmaskarray")(given));
+  const py::array plain = py::array(numpy.attr("asarray")(given));  // with what a mask hides
+  requireNumbers(plain);
+  requireShape(plain, origin);
+  const py::object quiet =
+      numpy.attr("errstate")(py::arg("over") = "ignore", py::arg("invalid") = "ignore");
+  quiet.attr("__enter__")();
+  numbers.values = FloatArray(plain);
+  quiet.attr("__exit__")(py::none(), py::none(), py::none());
+  const char kind = plain.dtype().kind();
+  constexpr py::ssize_t kExactBytes = 2;  // integers of 16 bits and half floats are exact
+  if (kind == 'b' || plain.dtype().itemsize() <= kExactBytes ||
+      (kind == 'f' && plain.dtype().itemsize() == py::ssize_t(sizeof(float))))
+    return numbers;
+  // float64 has all floats, and all integers of 32 bits. Those of 64 bits are compared as integers
+  // and need not fit: floats up to 2^63 are integers too.
+  py::object differs;
+  if (kind == 'f') {
+    const py::object finite = numpy.attr("isfinite")(plain);
+    const py::object wide = numbers.values.attr("astype")(plain.dtype());
+    differs = numpy.attr("not_equal")(plain, wide).attr("__and__")(finite);
+    const py::object lost =
+        finite.attr("__and__")(numpy.attr("isfinite")(numbers.values).attr("__invert__")());
+    py::object seen = lost;
+    if (numbers.masked) seen = lost.attr("__and__")(numbers.masked->attr("__invert__")());
+    if (seen.attr("any")().cast<bool>())
+      throw UsageError("the value of voxel " + voxelIn(seen, origin) +
+                       " is beyond the range of float32; scale the array");
+  } else {
+    // The largest float below 2^63 or 2^64 becomes the type's limit, which differs from it.
+    const bool isSigned = kind == 'i';
+    const py::object limit =
+        isSigned ? py::float_(9223372036854774784.0) : py::float_(18446744073709549568.0);
+    const py::object wide = numpy.attr("minimum")(numbers.values.attr("astype")("float64"), limit)
+                                .attr("astype")(isSigned ? "int64" : "uint64");
+    differs = numpy.attr("not_equal")(plain, wide);
+    if (numbers.masked) differs = differs.attr("__and__")(numbers.masked->attr("__invert__")());
+    if (differs.attr("any")().cast<bool>())
+      throw UsageError(
+          "the integer of voxel " + voxelIn(differs, origin) +
+          " is no float32, which has all integers up to 2^24 only; subtract an offset, keep the "
+          "remainders and the quotients in two grids, or convert the array yourself if the "
+          "difference does not matter: array.astype('float32')");
+    return numbers;
+  }
+  numbers.areRounded = differs.attr("any")().cast<bool>();
+  if (numbers.areRounded) numbers.rounded = py::array_t<bool>(differs);
+  return numbers;
+}
+
+/// A voxel of the array is active if it is not masked and differs from the background by more than
+/// the threshold.
 BrickInput brickOfArray(const Dense& dense, Coord corner, float background, float threshold) {
   BrickInput brick{corner, {}, {}};
   brick.values.fill(background);
   for (int i = 0; i < kBrickVoxels; ++i) {
     const Coord voxel = corner + voxelLocal(i);
-    if (!dense.box().contains(voxel)) continue;
-    const float value = dense.at(voxel);
+    if (!dense.box.contains(voxel)) continue;
+    const std::size_t place = dense.placeOf(voxel);
+    if (dense.masked != nullptr && dense.masked[place]) continue;
+    const float value = dense.values[place];
     if (!std::isfinite(value))
       throw BadInput("the value of voxel " + toString(voxel) + " is not finite");
     if (!(std::abs(value - background) > threshold)) continue;
@@ -59,7 +151,7 @@ BrickInput brickOfArray(const Dense& dense, Coord corner, float background, floa
 }
 
 std::vector<BrickInput> bricksOf(const Dense& dense, float background, float threshold) {
-  const Coord first = brickOf(dense.box().min), last = brickOf(dense.box().max);
+  const Coord first = brickOf(dense.box.min), last = brickOf(dense.box.max);
   std::vector<std::vector<BrickInput>> slices(std::size_t(last.x - first.x + 1));
   tbb::parallel_for(std::size_t(0), slices.size(), [&](std::size_t s) {
     for (int y = first.y; y <= last.y; ++y)
@@ -82,12 +174,31 @@ struct ArrayOptions {
   bool levelSet;
 };
 
-Volume fromNumpy(const FloatArray& array, const ArrayOptions& options) {
+/// The number of active voxels whose float differs from the number of the array.
+std::uint64_t roundedOf(const Numbers& numbers, const Dense& dense, const SparseVolume& volume) {
+  if (!numbers.areRounded) return 0;
+  const bool* const rounded = numbers.rounded.data();
+  std::uint64_t count = 0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int i = 0; i < kBrickVoxels; ++i)
+      if (volume.active[b].test(i) && rounded[dense.placeOf(volume.brickCorner(b) + voxelLocal(i))])
+        ++count;
+  return count;
+}
+
+Volume fromNumpy(const py::object& array, const ArrayOptions& options) {
   if (!std::isfinite(options.background)) throw UsageError("background must be finite");
   if (!(options.threshold >= 0.0f)) throw UsageError("threshold must be 0 or above");
   if (!(options.voxelSize > 0.0) || !std::isfinite(options.voxelSize))
     throw UsageError("voxel_size must be finite and above 0");
-  const Dense dense = denseOf(array, options.origin);
+  const Numbers numbers = numbersOf(array, options.origin);
+  const Coord side{std::int32_t(numbers.values.shape(0)), std::int32_t(numbers.values.shape(1)),
+                   std::int32_t(numbers.values.shape(2))};
+  const Coord first = coordOf(options.origin);
+  const Dense dense{.values = numbers.values.data(),
+                    .masked = numbers.masked ? numbers.masked->data() : nullptr,
+                    .side = side,
+                    .box = {first, first + (side - Coord{1, 1, 1})}};
   const py::gil_scoped_release release;
   auto grid = std::make_shared<VolumeGrid>();
   grid->descriptor.name = options.name;
@@ -96,7 +207,8 @@ Volume fromNumpy(const FloatArray& array, const ArrayOptions& options) {
   grid->descriptor.transform = uniformTransform(options.voxelSize);
   grid->volume =
       makeVolume(bricksOf(dense, options.background, options.threshold), options.background);
-  return {std::move(grid)};
+  const std::uint64_t rounded = roundedOf(numbers, dense, grid->volume);
+  return {std::move(grid), rounded};
 }
 
 Box boxOrActive(const SparseVolume& volume, const std::optional<PlainBox>& box) {
@@ -131,33 +243,46 @@ py::array_t<float> toNumpy(const Volume& self, const std::optional<PlainBox>& pl
   return array;
 }
 
-/// The unique name, which may be empty, of the first grid that a fit can take.
-std::string firstOfNumbers(const std::filesystem::path& path) {
+/// The place of the first grid that a fit can take.
+std::size_t firstOfNumbers(const std::filesystem::path& path) {
   const VdbSummary summary = inspectVdb(path);
   const auto& grids = summary.grids;
   const auto first = std::find_if(grids.begin(), grids.end(),
                                   [](const GridSummary& g) { return g.skipReason.empty(); });
   if (first == grids.end())
     throw BadInput(path.string() + ": no grid of numbers has an active voxel");
-  return first->uniqueName;
+  return std::size_t(first - grids.begin());
 }
 
+constexpr const char* kWayOut =
+    "; the program vdb2esvr carries such a grid of a .vdb file unchanged (--keep NAME)";
+
 Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
-  const py::gil_scoped_release release;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name ? *name : firstOfNumbers(path)))};
+  return interruptible([&] {
+    try {
+      return Volume{std::make_shared<const VolumeGrid>(
+          name ? readGrid(path, *name) : readGrid(path, firstOfNumbers(path)))};
+    } catch (const CannotConvert& error) {
+      throw BadInput(error.what() + std::string(kWayOut));
+    } catch (const MemoryExceeded& error) {
+      throw MemoryExceeded(error.what() + std::string(kWayOut));
+    }
+  });
 }
 
 /// The only grid of a file, which may have no active voxel.
 Volume fromOnlyGrid(const std::filesystem::path& path) {
-  const py::gil_scoped_release release;
-  const std::string name = inspectVdb(path).grids.at(0).uniqueName;
-  return {std::make_shared<const VolumeGrid>(readGrid(path, name, {.allowEmpty = true}))};
+  return interruptible([&] {
+    constexpr std::size_t kOnly = 0;
+    return Volume{std::make_shared<const VolumeGrid>(readGrid(path, kOnly, {.allowEmpty = true}))};
+  });
 }
 
 void write(const Volume& self, const std::filesystem::path& path, const WriteOptions& options) {
-  const py::gil_scoped_release release;
-  const GridToWrite grid = self.grid.get();
-  writeGrids(path, {}, std::span(&grid, 1), options);
+  interruptible([&] {
+    const GridToWrite grid = self.grid.get();
+    writeGrids(path, {}, std::span(&grid, 1), options);
+  });
 }
 
 }  // namespace
@@ -167,7 +292,7 @@ void addVolume(py::module_& module) {
                      "A sparse volume: voxels that are active, and a background elsewhere.")
       .def_static(
           "from_numpy",
-          [](const FloatArray& array, float background, const Corner& origin, float threshold,
+          [](const py::object& array, float background, const Corner& origin, float threshold,
              double voxelSize, const std::string& name, bool levelSet) {
             return fromNumpy(array, {background, threshold, origin, voxelSize, name, levelSet});
           },
@@ -176,9 +301,17 @@ void addVolume(py::module_& module) {
           py::arg("name") = "density", py::arg("level_set") = false,
           "Makes a volume from an array of shape (nx, ny, nz), converted to float32.\n\n"
           "A voxel is active if it differs from the background by more than the threshold.\n"
+          "Elements that a masked array hides are not active, whatever their values are.\n"
+          "Integers that float32 does not have (2**24 + 1), numbers beyond its range, dates,\n"
+          "records, text and complex numbers are refused. Volume.rounded_values counts active\n"
+          "voxels whose double was rounded.\n"
           "origin is the voxel of array[0, 0, 0], and voxel_size is in world units.")
-      .def_static("from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
-                  "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default.")
+      .def_static(
+          "from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
+          "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default. It is named\n"
+          "as for --grid of the programs: \"density[1]\" is the second grid of a name, \"vel.x\" "
+          "a\n"
+          "component of vectors.")
       .def("to_numpy", &toNumpy, py::arg("box") = py::none(),
            "The voxels of a box ((x0, y0, z0), (x1, y1, z1)), both inclusive, as float32 of shape\n"
            "(nx, ny, nz); by default those of Volume.box.")
@@ -206,9 +339,26 @@ void addVolume(py::module_& module) {
       .def_property_readonly(
           "active_voxels", [](const Volume& v) { return activeVoxelCount(v.grid->volume); },
           "Number of active voxels.")
+      .def_readonly("rounded_values", &Volume::roundedValues,
+                    "Number of active voxels of from_numpy whose float32 differs from the element.")
+      .def_property_readonly(
+          "inactive_values", [](const Volume& v) { return v.grid->inactive.count(); },
+          "Number of inactive voxels of the file, those of tiles included, whose values are not "
+          "the\n"
+          "background. A volume does not hold these values.")
       .def_property_readonly(
           "box", [](const Volume& v) { return plainBox(activeBox(v.grid->volume)); },
           "The first and the last active voxel along each axis; None if there is none.")
+      .def_property_readonly(
+          "value_range",
+          [](const Volume& v) -> std::optional<std::pair<float, float>> {
+            if (activeVoxelCount(v.grid->volume) == 0) return std::nullopt;
+            const ValueRange range = activeRange(v.grid->volume);
+            return std::pair(range.min, range.max);
+          },
+          "The smallest and the largest active value; None if there is none. Their difference is "
+          "the\n"
+          "range of which --max-error takes a percentage.")
       .def_property_readonly(
           "transform", [](const Volume& v) { return matrixOf(v.grid->descriptor.transform); },
           "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.");

@@ -75,12 +75,4 @@ std::size_t availableMemory() {
   return free + attribute(cudaMemPoolAttrReservedMemCurrent);
 }
 
-std::size_t peakMemory() { return attribute(cudaMemPoolAttrUsedMemHigh); }
-
-void forgetPeakMemory() {
-  std::uint64_t zero = 0;
-  check(cudaMemPoolSetAttribute(poolOf(currentDevice()), cudaMemPoolAttrUsedMemHigh, &zero),
-        "resetting the peak memory");
-}
-
 }  // namespace esvr::cuda

@@ -26,9 +26,4 @@ void trimMemoryPool();
 /// \return bytes that are free on the current device, plus those that its pool holds, used or not
 [[nodiscard]] std::size_t availableMemory();
 
-/// \return the largest number of bytes that the current device's pool has handed out at once since
-///         the last call of forgetPeakMemory()
-[[nodiscard]] std::size_t peakMemory();
-void forgetPeakMemory();
-
 }  // namespace esvr::cuda

@@ -16,7 +16,7 @@ namespace esvr {
 namespace {
 
 constexpr std::chrono::milliseconds kPause{1};
-constexpr int kAsk = 1, kAnswer = 2;  // tags of messages
+constexpr int kAsk = 1, kAnswer = 2, kEnded = 3;  // tags of messages
 constexpr std::int64_t kNoneLeft = -1;
 constexpr std::uint64_t kEnd = 0x454E4420'4F464649;  // number on which ranks that end agree
 
@@ -76,7 +76,7 @@ class MpiRanks : public Ranks {
     MPI_Comm_free(&host);
   }
   ~MpiRanks() override {
-    (void)agree(kEnd);  // a rank that does not end yet sees here that this one does
+    if (!haveAllEnded_) (void)agree(kEnd);  // a rank that does not end yet sees that this one does
     MPI_Finalize();
   }
   MpiRanks(const MpiRanks&) = delete;
@@ -117,6 +117,23 @@ class MpiRanks : public Ranks {
       broadcast(all[n], owners[n]);
     }
     return all;
+  }
+
+  bool allEnd(double seconds) override {
+    if (dispatcher_) return false;  // its thread uses MPI, and other ranks still ask it for numbers
+    const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    std::vector<MPI_Request> requests;
+    for (int other = 0; other < count_; ++other) {
+      if (other == rank_) continue;
+      MPI_Isend(nullptr, 0, MPI_BYTE, other, kEnded, MPI_COMM_WORLD, &requests.emplace_back());
+      MPI_Irecv(nullptr, 0, MPI_BYTE, other, kEnded, MPI_COMM_WORLD, &requests.emplace_back());
+    }
+    for (int done = 0; !done; std::this_thread::sleep_for(kPause)) {
+      MPI_Testall(int(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+      if (!done && std::chrono::steady_clock::now() > until) return false;
+    }
+    haveAllEnded_ = true;
+    return true;
   }
 
   void abort(int exitCode) override {
@@ -162,7 +179,7 @@ class MpiRanks : public Ranks {
 
   int rank_ = 0, count_ = 1, rankOnHost_ = 0;
   std::mutex mutex_;
-  bool isNoneLeft_ = true;
+  bool isNoneLeft_ = true, haveAllEnded_ = false;
   std::unique_ptr<Dispatcher> dispatcher_;  ///< on rank 0, while numbers are handed out
 };
 

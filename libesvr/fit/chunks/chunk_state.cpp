@@ -1,11 +1,10 @@
 #include "fit/chunks/chunk_state.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "core/parallel.h"
 #include "fit/ellipsoid_math.h"
 
 namespace esvr {
@@ -41,8 +40,8 @@ FitState without(const FitState& fit, const std::vector<bool>& dropped) {
 
 double energyOf(const ChunkScene& scene, const BrickChunk& chunk) {
   std::vector<double> energy(chunk.bricks.size());
-  tbb::parallel_for(std::size_t{0}, energy.size(),
-                    [&](std::size_t n) { energy[n] = energyOf(scene, chunk.bricks[n]); });
+  parallelFor(std::size_t{0}, energy.size(),
+              [&](std::size_t n) { energy[n] = energyOf(scene, chunk.bricks[n]); });
   return std::accumulate(energy.begin(), energy.end(), 0.0);
 }
 

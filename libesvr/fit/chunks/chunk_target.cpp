@@ -1,13 +1,12 @@
 #include "fit/chunks/chunk_target.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 #include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/parallel.h"
 #include "esvr/field.h"
 #include "fit/export_field.h"
 #include "fit/tuning.h"
@@ -39,7 +38,7 @@ std::vector<float> sumsIn(const FitTarget& target, const Ghosts& ghosts) {
   std::vector<float> values(corners.size() * kBrickVoxels);
   evaluateBricks(field, corners, values);
   std::vector<float> sums(target.values.size());
-  tbb::parallel_for(std::size_t{0}, corners.size(), [&](std::size_t n) {
+  parallelFor(std::size_t{0}, corners.size(), [&](std::size_t n) {
     const auto from = values.begin() + std::ptrdiff_t(n * kBrickVoxels);
     const std::size_t b = index.find(brickOf(corners[n]));
     std::copy_n(from, kBrickVoxels, sums.begin() + std::ptrdiff_t(b * kBrickVoxels));

@@ -179,6 +179,7 @@ class ChunkedFit {
     for (const ChunkState& state : states_)
       all.insert(all.end(), state.fit.ellipsoids.begin(), state.fit.ellipsoids.end());
     if (isCancelled() && all.empty()) throw Cancelled();
+    const BestSoFar completion;
     FitResult result;
     result.secondsSeed = totals_.secondsSeed;
     result.curve.push_back(lastPoint(all.size()));

@@ -33,8 +33,9 @@ OptimiserOptions optimiserOptions(const FitOptions& options, const PartStart& st
 }
 
 PartEnd endOf(Optimiser& optimiser, const RunEnd& run, const PartStart& start, const Box& box) {
+  const BestSoFar completion;
   PartEnd end;
-  if (start.plan.to == 1.0) optimiser.dropUnseen();
+  if (start.plan.to == 1.0 && run.end != FitEnd::kCancelled) optimiser.dropUnseen();
   end.errors = optimiser.measure();
   end.fit = within(box, optimiser.state());
   end.kernel = optimiser.kernel();

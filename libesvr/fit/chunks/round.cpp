@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "esvr/error.h"
 #include "fit/ellipsoid_math.h"
 #include "fit/fit_plan.h"
 
@@ -18,7 +19,8 @@ int reachOf(const Ellipsoid& p, double radius) {
 }  // namespace
 
 bool Round::cancelled() const {
-  return scene_.options.cancel && scene_.options.cancel->cancelled();
+  const CancelToken* own = scene_.options.cancel;
+  return CancelScope::cancelled() || (own && own->cancelled());
 }
 
 PartKey Round::keyOf(std::size_t part) const { return esvr::keyOf(scene_, startOf(part)); }
@@ -36,8 +38,10 @@ PartEnd Round::notFitted(const PartStart& start) const {
   return end;
 }
 
-PartEnd Round::fitted(const PartStart& start, const Device& device) const {
+PartEnd Round::fitted(const PartStart& start, const Device& device) const try {
   return fitPart(scene_, start, {device, turns_, progress_.of(start.chunk)});
+} catch (const Cancelled&) {
+  return notFitted(start);
 }
 
 PartStart Round::startOf(std::size_t chunk) const {

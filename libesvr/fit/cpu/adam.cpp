@@ -1,8 +1,6 @@
 #include "fit/adam.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
+#include "core/parallel.h"
 #include "fit/adam_math.h"
 #include "fit/start_penalty.h"
 
@@ -11,7 +9,7 @@ namespace esvr {
 void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
               std::span<const EllipsoidGradient> gradients, const AdamStep& step) {
   using Range = tbb::blocked_range<std::size_t>;
-  tbb::parallel_for(Range(0, ellipsoids.size(), 64), [&](const Range& range) {
+  parallelFor(Range(0, ellipsoids.size(), 64), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       Ellipsoid& p = ellipsoids[i];
       const ParameterVector gradient = penalised(gradients[i], p, states[i].start, step.penalty);

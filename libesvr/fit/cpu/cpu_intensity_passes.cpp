@@ -1,12 +1,12 @@
 #include "fit/cpu/cpu_intensity_passes.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+
+#include "core/parallel.h"
 
 namespace esvr {
 namespace {
@@ -106,7 +106,7 @@ std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTap
 template <class Middle>
 void CpuIntensityPasses::pass(bool backward, const Middle& middle) {
   tbb::enumerable_thread_specific<PairTapes> scratches;
-  tbb::parallel_for(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
+  parallelFor(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
     PairTapes& scratch = scratches.local();
     for (std::size_t b = range.begin(); b != range.end(); ++b) {
       alignas(64) float sum[kBrickVoxels] = {};
@@ -125,7 +125,7 @@ void CpuIntensityPasses::sumPairs(float PairProjection::*value, std::vector<doub
   const auto& pairs = plan_.pairs;
   const std::size_t n = plan_.field.forms.size();
   out.assign(n, 0.0);
-  tbb::parallel_for(Range(0, n, kEllipsoidGrain), [&](const Range& range) {
+  parallelFor(Range(0, n, kEllipsoidGrain), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
         out[i] += double(projections_[pairs.pairOf[k]].*value);

@@ -1,13 +1,12 @@
 #include "fit/cpu/cpu_optimiser.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <numeric>
 
 #include "core/add_seconds.h"
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "field/gather.h"
 #include "fit/cpu/fit_errors.h"
@@ -31,7 +30,7 @@ CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& opti
 void CpuOptimiser::rebuildLists() {
   const double radius = supportRadius(pass_.kernel());
   listed_.resize(ellipsoids_.size());
-  tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
+  parallelFor(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     listed_[i] = listedSupport(ellipsoids_[i], states_[i].steps, listed_[i], radius, tuning_.slack);
   });
   pass_.rebuild(listed_);
@@ -43,7 +42,7 @@ void CpuOptimiser::rebuildLists() {
 bool CpuOptimiser::anyOutgrown() const {
   const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
   std::atomic<bool> any = false;
-  tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
+  parallelFor(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     if (!isHeld(listed_[i], ellipsoids_[i], core)) any = true;
   });
   return any;
@@ -60,7 +59,7 @@ void CpuOptimiser::step(double factor) {
             .limits = limits_,
             .penalty = {options_.starts.data(), weight}});
   std::atomic<std::uint32_t> refused = 0;
-  tbb::parallel_for(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
+  parallelFor(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     if (refuseStep(listed_[i], core, before[i], ellipsoids_[i])) ++refused;
   });
   refused_ += refused;
@@ -151,6 +150,7 @@ double CpuOptimiser::iterate(std::span<const double> factors) {
 }
 
 FitErrors CpuOptimiser::measure() {
+  pass_.setOffset(kAtVoxels);  // a cancelled iteration leaves its own
   buildTightLists();
   pass_.residuals(ellipsoids_, residuals_);
   return errorsOf(target_, {pass_.index(), residuals_});

@@ -3,14 +3,13 @@
 /// and the backward pass over one brick, and the sum over an ellipsoid's pairs. Derived passes
 /// differ in their loss (cpu_pass.h, paper/cpu_paper_pass.h).
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <span>
 #include <vector>
 
+#include "core/parallel.h"
 #include "field/brick_kernels.h"
 #include "field/brick_pairs.h"
 #include "field/gather.h"
@@ -93,7 +92,7 @@ class PairPass {
   template <class Visit>
   static void forEachEllipsoid(std::size_t count, const Visit& visit) {
     constexpr std::size_t kGrain = 64;
-    tbb::parallel_for(Range(0, count, kGrain), [&](const Range& range) {
+    parallelFor(Range(0, count, kGrain), [&](const Range& range) {
       for (std::size_t i = range.begin(); i != range.end(); ++i) visit(i);
     });
   }
@@ -101,7 +100,7 @@ class PairPass {
   template <class Visit>
   void forEachBrick(const Visit& visit) const {
     constexpr std::size_t kGrain = 4;
-    tbb::parallel_for(Range(0, brickCount(), kGrain), [&](const Range& range) {
+    parallelFor(Range(0, brickCount(), kGrain), [&](const Range& range) {
       for (std::size_t b = range.begin(); b != range.end(); ++b) visit(b);
     });
   }

@@ -1,8 +1,8 @@
 #include "fit/cpu/sample_voxels.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
+
+#include "core/parallel.h"
 
 namespace esvr {
 namespace {
@@ -16,8 +16,8 @@ double energy(std::span<const float> values, SignsAllowed signs) {
 /// Cumulative energy of the bricks; brick b covers [sums[b], sums[b + 1]).
 std::vector<double> energySums(const ResidualField& residual, const SamplingOptions& options) {
   std::vector<double> sums(options.targetBricks + 1, 0.0);
-  tbb::parallel_for(std::size_t(0), options.targetBricks,
-                    [&](std::size_t b) { sums[b + 1] = energy(residual.brick(b), options.signs); });
+  parallelFor(std::size_t(0), options.targetBricks,
+              [&](std::size_t b) { sums[b + 1] = energy(residual.brick(b), options.signs); });
   for (std::size_t b = 0; b < options.targetBricks; ++b) sums[b + 1] += sums[b];
   return sums;
 }

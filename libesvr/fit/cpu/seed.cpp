@@ -1,7 +1,6 @@
 #include "fit/cpu/seed.h"
 
-#include <tbb/parallel_for.h>
-
+#include "core/parallel.h"
 #include "fit/seed_math.h"
 
 namespace esvr {
@@ -32,7 +31,7 @@ std::vector<Ellipsoid> seedsFromResidual(const ResidualField& residual,
                                          const SeedOptions& options) {
   const auto [voxels, share] = sampleVoxels(residual, options.draw);
   std::vector<Ellipsoid> seeds(voxels.size());
-  tbb::parallel_for(std::size_t(0), seeds.size(), [&, &at = voxels, each = share](std::size_t i) {
+  parallelFor(std::size_t(0), seeds.size(), [&, &at = voxels, each = share](std::size_t i) {
     seeds[i] = seedAt(residual, at[i], options, each);
   });
   return seeds;

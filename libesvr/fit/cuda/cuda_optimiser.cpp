@@ -9,6 +9,7 @@
 #include "core/cuda/count32.h"
 #include "core/cuda/use_device.h"
 #include "esvr/error.h"
+#include "esvr/progress.h"
 #include "field/gather.h"
 #include "fit/cuda/least_useful.h"
 #include "fit/cuda/make_cuda_optimiser.h"
@@ -21,10 +22,8 @@
 namespace esvr::cuda {
 namespace {
 
-std::optional<LimitMemory> limitOf(const OptimiserOptions& options) {
-  if (!options.maxDeviceBytes) return std::nullopt;
-  return std::optional<LimitMemory>(std::in_place, *options.maxDeviceBytes);
-}
+/// Seconds for which the steps that are started at once may take. A cancellation waits for them.
+constexpr double kLongestWait = 0.2;
 
 }  // namespace
 
@@ -33,7 +32,7 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
     : target_(target),
       options_(options),
       tuning_(tuning),
-      limit_(limitOf(options)),
+      memory_(options.maxDeviceBytes.value_or(MemoryAccount::kNoLimit)),
       bricks_(target.bricks, stream_.get()),
       lists_(stream_.get()),
       targetValues_(target.values, stream_.get()),
@@ -274,11 +273,19 @@ std::size_t CudaOptimiser::look(std::size_t started) {
 
 double CudaOptimiser::iterate(std::span<const double> factors) {
   while (!factors.empty()) {
+    CancelScope::check();
     if (stale_) withFewer([&] { rebuildLists(); });
     useForms(offsetAfter(0));
     const std::size_t started = std::min(factors.size(), ahead_);
-    for (std::size_t n = 0; n < started; ++n) step(factors[n], n);
-    factors = factors.subspan(look(started));
+    double seconds = 0.0;
+    {
+      const AddSeconds timer(seconds);
+      for (std::size_t n = 0; n < started; ++n) step(factors[n], n);
+      factors = factors.subspan(look(started));
+    }
+    // The steps do not depend on how many are started at once.
+    if (seconds > kLongestWait)
+      ahead_ = std::max<std::size_t>(std::size_t(double(started) * kLongestWait / seconds), 1);
   }
   return loss_;
 }

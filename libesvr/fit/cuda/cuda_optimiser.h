@@ -88,7 +88,7 @@ class CudaOptimiser final : public Optimiser {
   KernelConstants<double> kernel_;
   double radius_;
   double unitVariance_;
-  std::optional<LimitMemory> limit_;
+  MemoryShare memory_;  ///< what the buffers below take
   KeepFreedMemory keepFreed_;
   Stream stream_;
   BrickTable bricks_;

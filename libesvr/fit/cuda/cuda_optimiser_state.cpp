@@ -6,7 +6,7 @@
 
 namespace esvr::cuda {
 
-std::size_t CudaOptimiser::deviceBytes() const { return peakMemory(); }
+std::size_t CudaOptimiser::deviceBytes() const { return memory_.peak(); }
 
 std::vector<Ellipsoid> CudaOptimiser::ellipsoids() const {
   std::vector<Ellipsoid> host(count_);

@@ -11,7 +11,6 @@ std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
                                              const OptimiserOptions& options,
                                              const Tuning& tuning) {
   cuda::useDevice(options.device);
-  cuda::forgetPeakMemory();
   cuda::requireMemory(target, 1, options.maxDeviceBytes);
   return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);
 }

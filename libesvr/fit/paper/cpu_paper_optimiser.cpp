@@ -1,10 +1,9 @@
 #include "fit/paper/cpu_paper_optimiser.h"
 
-#include <tbb/parallel_for.h>
-
 #include <cmath>
 #include <utility>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "field/gather.h"
 #include "fit/cpu/fit_errors.h"
@@ -15,7 +14,7 @@ namespace {
 
 template <class Visit>
 void forEachEllipsoid(std::size_t count, Visit&& visit) {
-  tbb::parallel_for(std::size_t(0), count, visit);
+  parallelFor(std::size_t(0), count, visit);
 }
 
 }  // namespace

@@ -94,6 +94,7 @@ namespace esvr {
 PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& options) {
   using namespace paper;
   check(options);
+  const CancelScope scope(CancelScope::orToken(options.cancel));
   const FitTarget target = makeTarget(volume, options.box, options.peak);
   PaperRecord record = newRecord(target, options);
   if (isEmpty(target)) return {emptyFit(volume, Kernel{}.kappa), std::move(record)};
@@ -103,6 +104,7 @@ PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& opt
   record.subvolumes = optimiser->subvolumeCount();
   const FitEnd end = runPaper(*optimiser, {target, record.method, options}, recorder, record);
 
+  const BestSoFar completion;
   const KernelKind kind = kindOf(record.method);
   Population population = optimiser->population();
   dropUnseen(population, kind, spaceOf(target).voxels());

@@ -1,7 +1,6 @@
 #include "fit/paper/paper_field.h"
 
-#include <tbb/parallel_for.h>
-
+#include "core/parallel.h"
 #include "fit/paper/paper_math.h"
 #include "fit/paper/prune.h"
 
@@ -21,7 +20,7 @@ Field fieldOf(const Population& population, const KernelKind& kind, ExportFrame 
 
 void dropUnseen(Population& population, const KernelKind& kind, const Box& box) {
   std::vector<double> seen(population.size());
-  tbb::parallel_for(std::size_t(0), seen.size(), [&](std::size_t i) {
+  parallelFor(std::size_t(0), seen.size(), [&](std::size_t i) {
     seen[i] = coverageOf(population.ellipsoids[i], {kind, box, 0.0}).voxels > 0.0 ? 1.0 : 0.0;
   });
   std::size_t count = 0;

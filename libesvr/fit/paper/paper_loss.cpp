@@ -1,8 +1,6 @@
 #include "fit/paper/paper_loss.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "field/brick_halo.h"
 #include "field/dilate_bricks.h"
@@ -63,7 +62,7 @@ Box rowsThatSee(const Box& support) {
 
 template <class Visit>
 void forEachBrick(std::size_t count, Visit&& visit) {
-  tbb::parallel_for(Range(0, count, kBricksPerTask), [&](const Range& range) {
+  parallelFor(Range(0, count, kBricksPerTask), [&](const Range& range) {
     for (std::size_t b = range.begin(); b != range.end(); ++b) visit(b);
   });
 }

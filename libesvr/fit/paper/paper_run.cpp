@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "esvr/error.h"
 #include "esvr/field.h"
 #include "fit/export_field.h"
 #include "fit/paper/densify.h"
@@ -32,6 +33,15 @@ class Epochs {
 
   FitEnd go() {
     place();
+    try {
+      return visitEpochs();
+    } catch (const Cancelled&) {
+      return FitEnd::kCancelled;
+    }
+  }
+
+ private:
+  FitEnd visitEpochs() {
     const PaperMethod& method = run_.method;
     for (std::uint32_t epoch = 1; epoch <= method.epochs; ++epoch) {
       if (recorder_.cancelled()) return FitEnd::kCancelled;
@@ -44,7 +54,6 @@ class Epochs {
     return run_.options.psnr ? FitEnd::kPsnrMissed : FitEnd::kScheduleDone;
   }
 
- private:
   void place() {
     Population population;
     population.ellipsoids =
@@ -84,6 +93,7 @@ class Epochs {
   void visitAll(std::uint32_t epoch) {
     const auto parts = optimiser_.subvolumeCount();
     for (std::size_t s = 0; s < parts; ++s) {
+      CancelScope::check();
       ++record_.iterations;
       const double done = double(epoch - 1) + double(s) / double(parts);
       optimiser_.iterate(s, stepAt(done / run_.method.epochs));

@@ -1,11 +1,10 @@
 #include "fit/paper/prune.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "core/parallel.h"
 #include "field/support.h"
 #include "fit/paper/paper_math.h"
 #include "fit/paper/ray_scores.h"
@@ -95,8 +94,8 @@ std::vector<double> pruneScores(std::span<const PaperEllipsoid> ellipsoids, Prun
   if (score == PruneScore::kRays)
     scores = rayContributions(ellipsoids, options);
   else
-    tbb::parallel_for(std::size_t(0), scores.size(),
-                      [&](std::size_t i) { scores[i] = scoreOf(ellipsoids[i], score, options); });
+    parallelFor(std::size_t(0), scores.size(),
+                [&](std::size_t i) { scores[i] = scoreOf(ellipsoids[i], score, options); });
   if (score != PruneScore::kContribution && score != PruneScore::kRays) return scores;
   const auto factors = volumeFactors(ellipsoids);
   for (std::size_t i = 0; i < scores.size(); ++i) scores[i] *= factors[i];

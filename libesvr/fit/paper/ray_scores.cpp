@@ -1,12 +1,11 @@
 #include "fit/paper/ray_scores.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <numeric>
 
+#include "core/parallel.h"
 #include "fit/paper/paper_math.h"
 
 namespace esvr::paper {
@@ -153,7 +152,7 @@ std::vector<double> rayContributions(std::span<const PaperEllipsoid> ellipsoids,
                                      const CoverageOptions& options, int views) {
   const std::vector<Seen> seen = seenFrom(ellipsoids, options);
   std::vector<std::vector<double>> parts(kParts, std::vector<double>(seen.size()));
-  tbb::parallel_for(0, kParts, [&](int part) {
+  parallelFor(0, kParts, [&](int part) {
     Picture picture(cornerRadius(options.box));
     for (int k = part; k < views; k += kParts) {
       const View view = viewOf(k, views);

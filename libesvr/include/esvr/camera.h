@@ -1,6 +1,8 @@
 #pragma once
-/// Cameras. All lengths are voxels of the grid's index space: voxel (i, j, k) lies at (i, j, k),
-/// and the grid's transform is not used.
+/// Cameras. They see a grid in its proportions in the world: a camera's space has the axes of the world,
+/// its origin is the place of voxel (0, 0, 0), and its unit of length is the shortest edge of a voxel.
+/// Voxel (i, j, k) lies at i a + j b + k c there, with the edges a, b and c of a VoxelShape. For a grid
+/// whose voxels are cubes along the axes of the world this is (i, j, k), whatever their size is.
 
 #include <array>
 #include <optional>
@@ -11,6 +13,30 @@ namespace esvr {
 
 using Vec3 = std::array<double, 3>;
 
+/// The edges of a voxel in a camera's space: the steps from a voxel to the next ones along i, j and k.
+struct VoxelShape {
+  std::array<Vec3, 3> edges{{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}};
+
+  /// True for cubes along the axes, for which the camera's space is the index space.
+  [[nodiscard]] bool isCube() const { return *this == VoxelShape{}; }
+  /// The place of a point of the index space.
+  [[nodiscard]] Vec3 place(const Vec3& index) const;
+  friend bool operator==(const VoxelShape&, const VoxelShape&) = default;
+};
+
+/// The shape of the voxels of a grid. Edges that differ from those of a cube by less than 1e-5 of their
+/// length, as float32 rounds sizes of voxels, make a cube.
+/// \param affine  Transform::affine of the grid
+/// \return nothing for a grid without an affine transform (a frustum), or if a voxel has no volume or
+///         is not finite; such a grid is drawn in its index space
+[[nodiscard]] std::optional<VoxelShape> voxelShape(
+    const std::optional<std::array<double, 16>>& affine);
+
+/// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
+struct PlaceBox {
+  Vec3 low, high;
+};
+
 enum class Projection { kPerspective, kOrthographic };
 
 struct Camera {
@@ -18,8 +44,10 @@ struct Camera {
   Vec3 center{0.0, 0.0, 0.0};  ///< the point in the middle of the picture
   Vec3 up{0.0, 1.0, 0.0};      ///< a direction that points upwards in the picture
   Projection projection = Projection::kPerspective;
-  double fov = 30.0;    ///< vertical field of view in degrees; perspective only
-  double height = 1.0;  ///< vertical field of view in voxels; orthographic only
+  double fov = 30.0;  ///< vertical field of view in degrees; perspective only
+  double height =
+      1.0;             ///< vertical field of view in units of the camera's space; orthographic only
+  VoxelShape voxel{};  ///< of the grid that is drawn
 };
 
 struct Resolution {
@@ -49,6 +77,7 @@ struct CameraWish {
   /// Direction from the center to the eye if the eye is not given; the default is a little above and
   /// to the right.
   std::optional<Vec3> direction{};
+  VoxelShape voxel{};  ///< of the grid that is drawn
 };
 
 /// The share of the picture's width or height, whichever is tighter, that a fitted box takes.
@@ -63,11 +92,11 @@ inline constexpr double kFilledShare = 0.9;
 /// If `center` or `eye` is given, the box is not moved to the middle; the corner that is farthest
 /// from the middle of the picture then takes half of kFilledShare. If the eye of a perspective
 /// camera or the height of an orthographic picture is given, nothing is fitted.
-/// \param box  a box that is not empty
+/// \param box  of voxels, in index space; not empty
 [[nodiscard]] Camera fitCamera(const Box& box, const CameraWish& wish, Resolution resolution);
 
 /// The point about which the pictures of Framing::kTurn turn: the center that was given, or the
-/// middle of the box.
+/// middle of the box, in the camera's space.
 [[nodiscard]] Vec3 pivotOf(const Box& box, const CameraWish& wish);
 
 /// Turns a camera about the axis through `pivot` along `up`, counterclockwise as seen from above.
@@ -79,7 +108,8 @@ inline constexpr double kFilledShare = 0.9;
 
 /// Validates a camera and a resolution.
 /// \throws UsageError  a number is not finite; eye and center are equal; up has no length or is
-///                     parallel to the view; fov is not between 0 and 180; height is not positive;
+///                     parallel to the view, or their distance is not finite; fov is not between 0
+///                     and 180; height is not positive; the voxels have no volume;
 ///                     the picture has no pixels or a side above kMaxSide
 void checkCamera(const Camera& camera, Resolution resolution);
 

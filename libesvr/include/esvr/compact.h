@@ -30,6 +30,11 @@ struct CompactOptions {
   /// (renewActivity); nothing: the rule stays. If `bytes` are given, it stays where another one would
   /// take more bytes.
   std::optional<ActivityOptions> activity{};
+  /// The result is made in about the time of three evaluations of the grid: the steps are those with
+  /// which a search would begin, or, for `bytes`, the first that fit; the intensities are rounded but
+  /// not solved for, and there are no errors of layers. It serves to complete a conversion that was
+  /// cancelled. `activity` is ignored.
+  bool quick = false;
 };
 
 struct CompactResult {

@@ -68,9 +68,13 @@ struct StoredGrid {
   std::vector<Coord> bricks;
   std::vector<BrickMask> mask;      ///< active voxels of each brick, for kMask; else empty
   std::vector<BlockLevels> levels;  ///< levels of each brick, for kBlocks; else empty
-  bool withinRange = true;          ///< decoded values are clamped to the source's range of values
-  Box activeBox;                    ///< active bounding box of the source, index coordinates
-  std::uint64_t activeVoxels = 0;   ///< number of active voxels of the source
+  /// The background of the source is far from its values (spanOf, sparse_volume.h). The background of
+  /// `field` and of `voxels` then is a value among the active ones, to which these are relative, and
+  /// decoded inactive voxels get the background of `descriptor`. Only with kMask or with voxels.
+  bool farBackground = false;
+  bool withinRange = true;         ///< decoded values are clamped to the source's range of values
+  Box activeBox;                   ///< active bounding box of the source, index coordinates
+  std::uint64_t activeVoxels = 0;  ///< number of active voxels of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< range of the source's active voxels
   std::vector<CurvePoint> curve;
   /// The quantised ellipsoids of every chunk. The ellipsoids of `field` are exactly their
@@ -155,6 +159,18 @@ struct GridOfFile {
 /// The names of all grids in the order of the file.
 [[nodiscard]] std::vector<std::string> namesInOrder(const EsvrFile& file);
 
+/// The names by which users find each of EsvrFile::grids: GridNames::unique (grid_names.h), and for
+/// components of vectors GridNames::ofComponent. They are the same as in the .vdb file that the file comes
+/// from, if it has all grids of it.
+[[nodiscard]] std::vector<std::string> namesOfStored(const EsvrFile& file);
+
+/// The index in EsvrFile::grids of the grid of numbers or the component that a user names (GridNames).
+/// \param path  file name for the error's text; empty if the caller adds it
+/// \throws BadInput  there is no such grid, or its name is ambiguous (the text lists grids); the grid is
+///                   carried or has vectors, of which one component is to be named
+[[nodiscard]] std::size_t findStored(const EsvrFile& file, const std::string& wanted,
+                                     const std::filesystem::path& path = {});
+
 struct ContainerWriteOptions {
   bool overwrite = false;
 };
@@ -177,6 +193,10 @@ struct ReadLimits {
   VoxelMemory memory{};
   bool carriedBytes = true;  ///< false: the bytes of carried grids are checked, but not kept
 };
+
+/// Bytes of the heap that the content of a file takes: ellipsoids, voxels and carried grids. Voxels in
+/// files do not count.
+[[nodiscard]] std::uint64_t contentBytes(const EsvrFile& file);
 
 /// Reads a whole file. Every size is checked before memory is allocated, every section is checked
 /// against its checksum, and every parameter must be finite.

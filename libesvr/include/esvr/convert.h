@@ -51,8 +51,10 @@ struct PsnrGoal {
 /// A grid that restores every voxel within a bound. The grid holds voxels, or ellipsoids with a
 /// residual if these take fewer bytes. FitOptions::count, psnr and seconds are ignored.
 struct BoundGoal {
-  double bound = 0.0;     ///< largest absolute error, 0 or above
-  bool relative = false;  ///< `bound` is a share of the range of the active values
+  double bound = 0.0;  ///< largest absolute error, 0 or above
+  /// `bound` is a share of valueRangeOf() of the volume (metrics.h). The components of a vector have
+  /// one range, valueRangeOfVectors(), so that their bound should be given in units of the values.
+  bool relative = false;
 };
 
 /// A grid that restores every voxel and the active mask bit for bit. It holds voxels.
@@ -195,6 +197,9 @@ struct Conversion {
 ///                     representation exclude each other; kEllipsoids is requested for a BoundGoal
 ///                     that ellipsoids with a residual cannot reach; a SizeGoal is too small for
 ///                     the ellipsoids of a narrow band and the residual of their signs
+/// A volume whose background is far from its values (spanOf, sparse_volume.h) is converted relative
+/// to a value among them, with its exact mask whatever StorageOptions::activity says, unless the goal
+/// is lossless (StoredGrid::farBackground).
 /// Values that differ from the background by more than 2^120 (1.3e36) are too large for sums in
 /// float32; such a grid is stored as voxels.
 /// \throws BadInput  values are too large for sums, and the goal or an option needs ellipsoids (the

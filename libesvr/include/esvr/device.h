@@ -2,6 +2,7 @@
 /// Selects the device that computes.
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -12,7 +13,12 @@ enum class DeviceKind { kCpu, kCuda };
 struct Device {
   DeviceKind kind = DeviceKind::kCpu;
   int index = 0;  ///< number of the CUDA device
+  friend bool operator==(const Device&, const Device&) = default;
 };
+
+/// Is told that a device failed and is not used any more, and why, while other devices go on. It may be
+/// called on any thread.
+using LostDevice = std::function<void(const Device& device, const std::string& why)>;
 
 /// True if the library was built with CUDA, whether or not the machine has a GPU.
 [[nodiscard]] bool builtWithCuda() noexcept;

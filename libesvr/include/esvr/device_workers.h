@@ -1,6 +1,7 @@
 #pragma once
 /// Runs the parts of a fit in chunks on several devices of this process.
 
+#include <memory>
 #include <vector>
 
 #include "esvr/device.h"
@@ -8,18 +9,24 @@
 
 namespace esvr {
 
+class WorkingDevices;
+
 /// A thread for each device takes one part after the other.
 class DeviceWorkers : public PartRunner {
  public:
   /// \param devices  at least one. If the CPU is listed twice, it runs two parts at the same time;
   ///                 if a GPU is, a part is prepared on the host while the GPU fits another one
-  explicit DeviceWorkers(std::vector<Device> devices);
+  /// \param onLost   is told when a device fails and the others do its parts; it may be empty
+  explicit DeviceWorkers(std::vector<Device> devices, LostDevice onLost = {});
+  ~DeviceWorkers() override;
 
-  /// \throws Error  what a part threw; the other devices end their current parts first
+  /// \throws DeviceError  all devices have failed
+  /// \throws Error  what else a part threw; the other devices end their current parts first
   std::vector<std::vector<std::byte>> run(const RoundParts& parts) override;
 
  private:
   std::vector<Device> devices_;
+  std::unique_ptr<WorkingDevices> working_;
 };
 
 }  // namespace esvr

@@ -36,6 +36,15 @@ struct UsageError : Error {
 struct BadInput : Error {
   explicit BadInput(const std::string& what) : Error(ErrorKind::kBadInput, what) {}
 };
+/// Input that is sound, but that a conversion cannot represent, such as voxels that are 2^31 apart. A
+/// .vdb grid of this kind can still be carried unchanged (carried_grid.h).
+struct CannotConvert : BadInput {
+  explicit CannotConvert(const std::string& what) : BadInput(what) {}
+};
+/// Voxels that are NaN, infinite or too large for float. A reader can replace them (NonFinite, vdb_io.h).
+struct NotFinite : CannotConvert {
+  explicit NotFinite(const std::string& what) : CannotConvert(what) {}
+};
 struct TargetMissed : Error {
   explicit TargetMissed(const std::string& what) : Error(ErrorKind::kTargetMissed, what) {}
 };

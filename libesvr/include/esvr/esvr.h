@@ -45,7 +45,8 @@ const char* esvr_error(void);
 
 /// Opens a file. All of it is read and checked.
 /// \param path        in the encoding of the system's file names
-/// \param max_memory  limit on the bytes that its content may take; 0: no limit
+/// \param max_memory  limit on the bytes that its content may take; 0: half of the memory of the
+///                    machine; UINT64_MAX: no limit
 /// \param file        output; null on failure
 esvr_status esvr_open(const char* path, uint64_t max_memory, esvr_file** file);
 
@@ -114,7 +115,7 @@ esvr_status esvr_evaluate(const esvr_file* file, size_t grid, size_t count, cons
 
 /// Decodes the voxels of a grid, or those in a box.
 /// \param box         x0, y0, z0, x1, y1, z1, inclusive; null: all voxels
-/// \param max_memory  limit on the bytes that this may take; 0: no limit
+/// \param max_memory  limit on the bytes that this may take, as for esvr_open
 /// \param volume      output; null on failure
 esvr_status esvr_decode(const esvr_file* file, size_t grid, const int32_t* box, uint64_t max_memory,
                         esvr_volume** volume);

@@ -79,7 +79,7 @@ void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, Sto
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 
 /// True if the voxels of a grid follow from its ellipsoids by voxelRule() alone. This is not so if
-/// it stores voxels or a residual.
+/// it stores voxels or a residual, or if its inactive voxels have a far background.
 [[nodiscard]] bool followsFromEllipsoids(const StoredGrid& grid);
 
 struct DecodeOptions {
@@ -96,9 +96,11 @@ struct DecodeOptions {
 [[nodiscard]] WorkEstimate estimateDecode(const StoredGrid& grid,
                                           const DecodeOptions& options = {});
 
-/// The voxels that a stored grid represents.
-/// \throws UsageError  the threshold is negative or not finite, or the grid stores voxels, which say
-///                     themselves whether they are active
+/// The voxels that a stored grid represents. If the source was saved as half (ValueType::kHalf), the
+/// active voxels are halfs (roundToHalfs, voxel_layer.h), so that a .vdb file of them has the same
+/// values and keeps the same bound.
+/// \throws UsageError  the threshold is negative or not finite, or the grid stores voxels or has a far
+///                     background, so that it says itself which voxels are active
 /// \throws MemoryExceeded  the estimate is above options.maxBytes; nothing was evaluated
 [[nodiscard]] SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options = {});
 

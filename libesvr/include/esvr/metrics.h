@@ -47,10 +47,16 @@ struct VolumeMetrics {
 [[nodiscard]] double psnrOverBox(const SparseVolume& reference, const SparseVolume& candidate,
                                  const CompareOptions& options = {});
 
-/// The peak of the PSNR: the largest value of the active voxels. If that is not positive, it is the
-/// largest magnitude of a value, or 1 if all values are zero.
+/// The peak of the PSNR of a volume: peakOf() of its active values and its background
+/// (sparse_volume.h). All programs, searches and reports use it.
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] double peakOf(const SparseVolume& reference);
+
+/// The range to which a bound on errors such as 1 % refers: the largest active value minus the
+/// smallest one, without the background, and 0 if all are equal. The bound of a vector refers to
+/// valueRangeOfVectors() (vector_metrics.h).
+/// \throws BadInput  there is no active voxel
+[[nodiscard]] double valueRangeOf(const SparseVolume& reference);
 
 /// 10 log10(peak^2 / mse) in dB; +inf for mse = 0.
 [[nodiscard]] double psnr(double mse, double peak);

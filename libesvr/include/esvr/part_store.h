@@ -75,7 +75,7 @@ class PartStore {
   /// \return nothing if another process fits the part
   [[nodiscard]] std::optional<Claim> claim(const PartKey& key);
 
-  /// Removes the folder with all results.
+  /// Removes all results, and the folder unless it has files that this class has not made.
   void remove();
 
  private:
@@ -98,6 +98,8 @@ struct StoredPartsOptions {
   PartShare share{};
   bool mergeOnly = false;  ///< parts are not fitted; all must be there
   const CancelToken* cancel = nullptr;
+  LostDevice
+      onLost{};  ///< is told when a device fails and the others do its parts; it may be empty
 };
 
 /// Takes the results of parts from a store, and fits those that are not there.

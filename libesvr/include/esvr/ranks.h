@@ -10,7 +10,7 @@
 namespace esvr {
 
 /// The processes are called ranks. All ranks call agree(), handOut() and exchange() in the same
-/// order. The destructor waits for all ranks.
+/// order. The destructor waits for all ranks, unless allEnd() has done so.
 class Ranks {
  public:
   using Bytes = std::vector<std::byte>;
@@ -33,6 +33,11 @@ class Ranks {
 
   /// Gives all ranks the results of all numbers. \param own  results of the numbers of this rank
   [[nodiscard]] virtual std::vector<Bytes> exchange(std::vector<std::optional<Bytes>> own) = 0;
+
+  /// Tells the other ranks that this one ends after a failure, and waits until all have told so. A rank
+  /// that failed alone must then abort the others, which would wait for it.
+  /// \return false if some have not told it within this time
+  [[nodiscard]] virtual bool allEnd(double seconds) = 0;
 
   /// Ends all ranks now.
   [[noreturn]] virtual void abort(int exitCode) = 0;

@@ -1,7 +1,11 @@
 #pragma once
 /// Draws pictures of a field or of a volume. Both follow one rule. The values along the ray of a
 /// pixel are sampled at the distances 0, step, 2 step, ... from the eye (orthographic: from the
-/// plane of the eye). Classification determines how their colors and opacities follow from these
+/// plane of the eye), as far as the ray lies in the volume. All distances, also those of opacities, are
+/// lengths in the camera's space (camera.h), and thus of the world. If the eye is more than 2^32 steps
+/// or voxels away from the volume, samples count from a plane in front of the volume instead; a
+/// perspective camera from which the volume looks the same by parallel rays, to a quarter of a pixel,
+/// then has parallel rays. Classification determines how their colors and opacities follow from these
 /// values; they are composited from front to back. A sample that is exactly the background is empty
 /// space: it is transparent, whatever the transfer function has there.
 ///
@@ -25,7 +29,7 @@ enum class RenderMode {
   kComposite,  ///< samples are composited from front to back
   kMaximum,    ///< the color and opacity of the largest value
   kAverage,    ///< the color and opacity of the mean value; empty space does not count
-  /// Red is the distance in voxels at which half of the light is absorbed (orthographic: from the
+  /// Red is the distance from the eye at which half of the light is absorbed (orthographic: from the
   /// plane of the eye), and alpha is 1. Both are 0 if the ray absorbs less than half.
   kDepth
 };
@@ -58,8 +62,8 @@ enum class Between {
 /// The rule for places where a pixel is wider than several voxels. Sums of ellipsoids (Between::kSum)
 /// and NanoVDB grids have no levels of detail.
 enum class LevelOfDetail {
-  /// At distances at which a pixel is at least 3 x 2^l voxels wide, means of 2^l x 2^l x 2^l voxels
-  /// are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
+  /// At distances at which a pixel is at least 3 x 2^l of a voxel's longest edges wide, means of
+  /// 2^l x 2^l x 2^l voxels are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
   /// take less time, and need less memory. A clip box has at least two voxels and two steps of a
   /// level along each axis, or the level is not used.
   kAuto,
@@ -74,15 +78,10 @@ enum class LevelOfDetail {
 /// of 8^3 voxels. A weak gradient is likely to be noise: both terms go over to those of n = l without
 /// a highlight, halfway where the gradient is 2 % of the transfer function's range per voxel.
 struct Shading {
-  /// Direction to the light in index space; by default, the light is above and to the left of the
+  /// Direction to the light in the camera's space; by default, the light is above and to the left of the
   /// camera and moves with it.
   std::optional<Vec3> light{};
   double ambient = 0.3, diffuse = 0.7, specular = 0.25, shininess = 25.0;
-};
-
-/// A box with real-valued corners. Voxel (i, j, k) extends half a voxel to each side of (i, j, k).
-struct PlaceBox {
-  Vec3 low, high;
 };
 
 /// How a grid looks that is drawn together with others (makeGridsRenderer).
@@ -98,8 +97,8 @@ struct RenderOptions {
   Resolution resolution;
   TransferFunction transfer;        ///< tabulated at 4097 values from its first point to its last
   std::vector<GridLook> further{};  ///< looks of the second grid and of those after it
-  double step = 1.0;                ///< distance between samples, voxels
-  /// The length, in voxels, over which the transfer function's opacities are reached. The opacity
+  double step = 1.0;                ///< distance between samples, in the camera's space
+  /// The length, in the camera's space, over which the transfer function's opacities are reached. The opacity
   /// of a step of constant value is 1 - (1 - opacity)^(step / opacityLength).
   double opacityLength = 1.0;
   /// A ray ends when its transmittance falls below this. The default changes a channel by at most
@@ -112,8 +111,9 @@ struct RenderOptions {
   LevelOfDetail lod = LevelOfDetail::kAuto;
   /// Only composited pictures of voxels are shaded: Between::kVoxels and RenderMode::kComposite.
   std::optional<Shading> shading{};
-  std::optional<PlaceBox> clip{};       ///< samples outside this box count as empty space
-  const CancelToken* cancel = nullptr;  ///< checked before each row of tiles
+  /// Samples outside this box count as empty space. Its places are those of the index space.
+  std::optional<PlaceBox> clip{};
+  const CancelToken* cancel = nullptr;  ///< checked before each pixel or tile
 };
 
 /// Draws a field. With Between::kSum, no voxels are stored: each ellipsoid adds to the samples of

@@ -16,7 +16,8 @@ namespace esvr {
 /// bound.
 /// \param grid   a grid that makeStoredGrid made from `source`
 /// \param bound  largest absolute error, above 0
-/// \return nothing if the grid is a narrow band, or if the margin exceeds a sixth of the bound
+/// \return nothing if the grid is a narrow band, or if the margin exceeds a sixth of the bound. If
+///         decodeGrid() rounds to halfs, the bound is diminished by half of their distance for this.
 [[nodiscard]] std::optional<StoredGrid> withResidual(StoredGrid grid, const SparseVolume& source,
                                                      double bound);
 

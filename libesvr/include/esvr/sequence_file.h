@@ -94,7 +94,7 @@ class SequenceWriter {
 class SequenceReader {
  public:
   /// Reads the index.
-  /// \param limits  of the memory of one decoded frame
+  /// \param limits  of the memory of a decoded frame and, if it refers to it, of the one before it
   /// \throws BadInput  the file is missing, holds no sequence, or its index is damaged
   explicit SequenceReader(const std::filesystem::path& path, const ReadLimits& limits = {});
   ~SequenceReader();

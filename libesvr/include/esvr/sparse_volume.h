@@ -107,6 +107,41 @@ struct ValueRange {
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] ValueRange activeRange(const SparseVolume& volume);
 
+/// The interval over which the values of a grid spread, active or not.
+struct ValueSpan {
+  double low = 0.0, high = 0.0;
+  /// True if the background is not in the interval, because it is far from the active values.
+  bool farBackground = false;
+
+  [[nodiscard]] double length() const { return high - low; }
+};
+
+/// The span of a grid: the interval from the smallest to the largest active value, extended to the
+/// background unless that is far. A background is far if it is farther from the interval than the
+/// interval is long, as the background 0 of a pressure between 101,325 and 101,365 Pa, or of a
+/// temperature between 280 and 310 K. Such a background says only where there is no value, and the
+/// values would be lost in a span that contains it. The background of an 8-bit scan whose active
+/// values begin at a threshold is not far, nor is that of a grid with one active value.
+/// \param active  range of the active values, as from activeRange
+[[nodiscard]] ValueSpan spanOf(const ValueRange& active, double background);
+
+/// spanOf() of a volume. \throws BadInput  there is no active voxel
+[[nodiscard]] ValueSpan spanOf(const SparseVolume& volume);
+
+/// The peak of the PSNR of a grid, to which its errors are relative. It is
+///  - for values of one sign, their range, as in compressors of scientific data. It begins at the
+///    background if that lies between 0 and the values and is not far (spanOf). For values from 0 up
+///    this is the largest value;
+///  - for values of both signs, the largest magnitude. A velocity from -v to v then has the peak v,
+///    which does not depend on the direction of the axes, and data of both signs have the quality
+///    that those of one sign have;
+///  - if all active values are equal, their magnitude, or 1 if they are 0.
+/// \param active  range of the active values, as from activeRange
+[[nodiscard]] double peakOf(const ValueRange& active, double background);
+
+/// Gives a volume another background, which all inactive voxels get.
+void setBackground(float background, SparseVolume& volume);
+
 /// Drops bricks without an active voxel, and moves the origin to the smallest corner of the others.
 void dropInactiveBricks(SparseVolume& volume);
 

@@ -100,7 +100,7 @@ void checkTransferFunction(const TransferFunction& function);
 
 /// Reads a ParaView preset in one of two formats:
 ///  - JSON: an object, or an array of objects, with "RGBPoints" [x r g b ...] and optionally
-///    "Name", "ColorSpace" (RGB, HSV, Lab, CIELAB, Diverging, Step), "HSVWrap", "Points"
+///    "Name", "ColorSpace" (RGB, HSV, Lab, CIELAB, Lab/CIEDE2000, Diverging, Step), "HSVWrap", "Points"
 ///    [x opacity midpoint sharpness ...] and "NanColor" [r g b]. The points may be in any order.
 ///  - the XML of older versions: <ColorMap name space> with <Point x o r g b> and <NaN r g b>. If
 ///    all opacities o are 1, the map has colors only, and the opacities are ignored.

@@ -14,6 +14,7 @@
 #include "esvr/carried_grid.h"
 #include "esvr/coord.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
@@ -21,10 +22,9 @@ namespace esvr {
 
 /// Properties of one grid of a file.
 struct GridSummary {
-  std::string name;  ///< stored name; may be empty or shared by several grids
-  /// The name that --grid takes: `name`, with "[i]" (i from 0) if several grids share it.
-  std::string uniqueName;
-  std::string valueType;  ///< OpenVDB's name: "float", "double", "vec3s", "ptdataidx32", ...
+  std::string name;        ///< stored name; may be empty or shared by several grids
+  std::string uniqueName;  ///< the name that --grid takes (GridNames::unique, grid_names.h)
+  std::string valueType;   ///< OpenVDB's name: "float", "double", "vec3s", "ptdataidx32", ...
   bool savedAsHalf = false;
   GridClass gridClass = GridClass::kUnknown;
   std::uint64_t activeVoxels = 0;
@@ -51,52 +51,75 @@ struct VdbSummary {
 ///                   names the file)
 [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path);
 
-/// Treatment of NaN and infinite voxels: they are an error, or they are replaced by 0.
-enum class NonFinite { kRefuse, kZero };
+/// Treatment of active voxels that are NaN, infinite or too large for float: they are an error, or
+/// they get a value or the background of their grid (of a vector: of the component).
+enum class NonFinite { kRefuse, kValue, kBackground };
 
 struct ReadOptions {
   NonFinite nonFinite = NonFinite::kRefuse;
-  bool allowEmpty = false;  ///< a grid without active voxels becomes a volume without bricks
+  float nonFiniteValue = 0.0f;  ///< the value of NonFinite::kValue, which is finite
+  bool allowEmpty = false;      ///< a grid without active voxels becomes a volume without bricks
   /// Limit on the memory of the file's tree and of the bricks that are made from it. Active tiles
   /// become bricks; one tile may become 2^27 bricks.
   std::uint64_t maxBytes = std::uint64_t{16} << 30;
   /// Holds the voxels. Those in a file do not count towards maxBytes. Of the tree of a .vdb file,
   /// only the leaf that is being read has its voxels in memory.
   VoxelMemory memory{};
+  /// Number of volumes of this size that the caller will have at the same time, with copies and codes
+  /// that it makes. A grid is refused before it is read if the memory has no room for their masks, or
+  /// the disk none for their voxels in files.
+  std::uint64_t volumes = 1;
 };
 
 /// A grid with its voxels.
 struct VolumeGrid {
   GridDescriptor descriptor;
   SparseVolume volume;
-  std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced under NonFinite::kZero
+  std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced as NonFinite says
+  InactiveValues inactive{};            ///< of the file; the volume does not hold them
 };
 
 /// Reads one grid with its active tiles. Active voxels of the volume hold the grid's values,
-/// rounded to float32. Inactive voxels hold the background and not the file's inactive values. In a
-/// level set they hold the background with the file's sign, which distinguishes inside from
-/// outside.
-/// \param name  "density" (the first grid of that name) or "density[1]" (the second)
-/// \throws BadInput  as for inspectVdb; the grid does not exist (the text lists the grids); its
-///                   type cannot be fitted; it has no active voxel (without allowEmpty); voxels are
-///                   not finite (the text gives the first coordinate and the number)
-/// \throws MemoryExceeded  the grid needs more than maxBytes
+/// rounded to float32. Inactive voxels hold the background and not the file's inactive values, which
+/// VolumeGrid::inactive counts. In a level set they hold the background with the file's sign, which
+/// distinguishes inside from outside.
+/// \param place  index of the grid in VdbSummary::grids
+/// \throws BadInput  as for inspectVdb; the file has no grid at this place; its type cannot be fitted;
+///                   it has no active voxel (without allowEmpty); voxels are not finite (the text
+///                   gives the first coordinate and the number)
+/// \throws CannotConvert  a BadInput of a sound grid: its voxels are not finite (NotFinite) or 2^31
+///                        apart, or its background is not a finite float
+/// \throws MemoryExceeded  the grid needs more than maxBytes, or more than the disk of files has free;
+///                         this is known from the tree, before tiles become bricks
+[[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
+                                  const ReadOptions& options = {});
+
+/// The same for a grid that a user has named (GridNames in grid_names.h): "density", "density[1]".
+/// "vel.x" is read as a component of the vectors "vel" if no grid has this very name.
+/// \throws BadInput, CannotConvert, MemoryExceeded  as above; no grid has the name, or several have it
+///                                                  (the text lists the grids)
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
 /// Reads a component of a grid of vectors in a .vdb file, as readGrid reads a grid of numbers. The
 /// name of the result is componentName(). The component x has the metadata of the grid; the others
 /// have none, so that a file with all of them holds the metadata once.
-/// \param name       as for readGrid
+/// \param place      as for readGrid
 /// \param component  0, 1 or 2
 /// \throws BadInput  as for readGrid; the grid has not GridSummary::isVector
 /// \throws MemoryExceeded  the component needs more than maxBytes
+[[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
+                                       std::size_t component, const ReadOptions& options = {});
+/// The same for a grid that a user has named. \throws  as above; as for readGrid by a name
 [[nodiscard]] VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
                                        std::size_t component, const ReadOptions& options = {});
 
 /// Reads all components of a grid of vectors.
 /// \throws BadInput  as for readComponent
 /// \throws MemoryExceeded  the components together need more than maxBytes
+[[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
+                                    const ReadOptions& options = {});
+/// The same for a grid that a user has named. \throws  as above; as for readGrid by a name
 [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
                                     const ReadOptions& options = {});
 
@@ -121,13 +144,18 @@ struct VolumeGrid {
 /// Reads the voxels of a carried grid of vectors. \throws  as for readVector
 [[nodiscard]] VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options = {});
 
-/// Choice of half floats for a written file; kAuto: half if the source was saved as half.
+/// Choice of half floats for a written file; kAuto: half for ValueType::kHalf, unless a value is
+/// beyond 65504, and for other grids whose metadata say half if half floats hold every value exactly.
+/// The values of decodeGrid() are halfs if those of the source were, so that nothing is rounded here.
 enum class HalfMode { kAuto, kOn, kOff };
 
 struct WriteOptions {
   HalfMode half = HalfMode::kAuto;
-  bool overwrite = false;     ///< replace an existing file
-  bool constantTiles = true;  ///< leaves whose voxels are all active and equal become tiles
+  bool overwrite = false;  ///< replace an existing file
+  /// Leaves whose voxels are all active and equal become tiles. If no leaf would remain, those
+  /// of a small grid all remain, and one of a larger grid, because Blender draws nothing of a grid
+  /// that has tiles only.
+  bool constantTiles = true;
 };
 
 /// Writes grids to a .vdb (with Blosc and active masks) or .nvdb file. The data go to a temporary

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "esvr/sparse_volume.h"
 
 namespace esvr {
@@ -21,7 +22,8 @@ struct VectorGrid {
   GridDescriptor descriptor;  ///< its background is that of component x
   std::array<double, kComponents> background{};
   VectorVolume components;
-  std::uint64_t nonFiniteReplaced = 0;  ///< components replaced under NonFinite::kZero
+  std::uint64_t nonFiniteReplaced = 0;  ///< components replaced as NonFinite says
+  InactiveValues inactive{};            ///< of the components together
 };
 
 /// The name of a component: that of the grid with ".x", ".y" or ".z".

@@ -16,9 +16,16 @@ struct VectorMetrics {
   std::array<VolumeMetrics, kComponents> components;
 };
 
-/// The length of the longest active vector, or 1 if all are zero.
+/// The length of the longest active vector, or 1 if all are zero. It does not depend on the
+/// direction of the axes.
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] double peakOfVectors(const VectorVolume& reference);
+
+/// The range to which a bound on the errors of all components refers, such as 1 %: the largest
+/// valueRangeOf() of a component. A component that hardly changes is thus not stored more precisely
+/// than the others.
+/// \throws BadInput  there is no active voxel
+[[nodiscard]] double valueRangeOfVectors(const VectorVolume& reference);
 
 /// Compares vectors by compareVolumes. A voxel of a grid of vectors is active if it is active in
 /// any component.

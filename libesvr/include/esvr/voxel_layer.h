@@ -61,14 +61,27 @@ enum class RoundedSigns {
   kKept
 };
 
+/// The numbers that a reader of a grid gets (ValueType, grid_descriptor.h).
+enum class DecodedValues {
+  kFloats,
+  kHalfs  ///< active voxels are rounded by roundToHalfs() after everything else
+};
+
+/// Rounds active voxels to the nearest half floats, as decodeGrid() does for a grid whose source was
+/// saved as half. Values beyond 65504 become 65504 with their sign, and no negative value becomes 0.
+void roundToHalfs(SparseVolume& volume);
+
 /// Makes a layer whose voxels are within `bound` of the volume's. If float32 is too coarse for the
 /// bound, the layer is exactLayer(). With a simplified mask, voxels of the source that differ from
 /// the background by more than the bound are active too.
 /// \param simplified  the volume's simplified masks for kAuto, if they are kept; null: one is made
+/// \param decoded     with kHalfs, the rounded voxels are within the bound, too. The volume's own
+///                    active voxels must be halfs.
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
                                       RoundedSigns signs = RoundedSigns::kMayChange,
-                                      const SimplifiedMasks* simplified = nullptr);
+                                      const SimplifiedMasks* simplified = nullptr,
+                                      DecodedValues decoded = DecodedValues::kFloats);
 
 /// What thriftyLayer() weighs. All errors are in squared steps of the quantisation lattice.
 struct ThriftOptions {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace esvr {
@@ -29,6 +30,11 @@ class VoxelMemory {
 
   /// \return whether an array of this size is in a file
   [[nodiscard]] bool isInFile(std::uint64_t bytes) const;
+
+  /// Checks that the disk of the files has this many bytes free. The heap is not checked.
+  /// \param what  subject of the message, for example "grid 'density'"
+  /// \throws MemoryExceeded  it has fewer; the text names the folder and gives both numbers
+  void requireRoom(double bytes, const std::string& what) const;
 
   /// \throws RuntimeFailure  the folder cannot be written, or its disk is full
   /// \throws std::bad_alloc  the heap is full

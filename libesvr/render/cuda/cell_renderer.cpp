@@ -29,8 +29,8 @@ class CellRenderer final : public MarchRenderer {
   static_assert(kBandRows % kMarchTileSide == 0);
 
   void prepare(const RenderOptions& o) override {
-    const View view(o.camera, o.resolution);
-    scene_ = {marchScene(o, sampleRule(o, {}, store_->background())),
+    const View view = viewOf(o, store_->box());
+    scene_ = {marchScene(o, view, sampleRule(o, {}, store_->background())),
               levelBounds(o, view, store_->box()),
               {}};
     store_->prepare(scene_->bounds);

@@ -207,7 +207,8 @@ __device__ float takeSum(Shared& s, int sample, int ray) {
 /// Adds a share of a bin's samples to a ray.
 __device__ void addSamples(const SamplingArguments& a, Shared& s, const Place& place,
                            const SumWork& work, int bin, const Share& share, RayState& ray) {
-  const float toEye = float(a.frame.firstBin) * kBinSamples;
+  const float toEye =
+      float(double(a.frame.firstBin) * kBinSamples + a.frame.view.before / a.frame.step);
   std::uint32_t left = s.touched & samplesFrom(share.first, share.end - 1);
   for (; left != 0; left &= left - 1) {
     const int sample = __ffs(int(left)) - 1;

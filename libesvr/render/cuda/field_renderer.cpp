@@ -81,8 +81,8 @@ TileLists BandMemory::lists() {
 
 /// The checked options of a picture, and values that are computed from them.
 struct FieldRenderer::Scene {
-  explicit Scene(const RenderOptions& o)
-      : options(o), view((checkRenderOptions(o), o.camera), o.resolution) {
+  Scene(const RenderOptions& o, const PlaceBox& box)
+      : options(o), view((checkRenderOptions(o), viewOf(o, box))) {
     refuseShading(o);
   }
 
@@ -111,7 +111,7 @@ Image FieldRenderer::draw(const RenderOptions& options) {
 void FieldRenderer::drawOnDevice(const RenderOptions& options) { drawFrame(options, nullptr); }
 
 void FieldRenderer::drawFrame(const RenderOptions& options, Image* image) {
-  Scene scene(options);
+  Scene scene(options, box_.value_or(kNoPlaces));
   if (image != nullptr)
     image->rgba.assign(std::size_t(4) * std::size_t(image->width) * std::size_t(image->height),
                        0.0f);

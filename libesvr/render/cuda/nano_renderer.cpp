@@ -1,10 +1,13 @@
 // The renderer that marches rays through a NanoVDB grid on a CUDA device.
 
+#include <optional>
+
 #include "render/cuda/make_cuda_renderer.h"
 #include "render/cuda/march_renderer.h"
 #include "render/cuda/nano_draw.h"
 #include "render/nano_box.h"
 #include "render/picture.h"
+#include "render/scene_depth.h"
 
 namespace esvr::cuda {
 namespace {
@@ -21,10 +24,12 @@ class NanoRenderer final : public MarchRenderer {
  private:
   void prepare(const RenderOptions& o) override {
     refuseShading(o);
+    view_ = viewOf(o, box_);
+    if (box_.low[0] <= box_.high[0]) checkRayLength(binsWithin(box_, *view_, o.step));
     table_ = table(0, o.transfer, samplingOf(o));
   }
   void launch(const RenderOptions& o, Band band, float4* pixels) override {
-    launchNano({.view = View(o.camera, o.resolution),
+    launchNano({.view = *view_,
                 .box = box_,
                 .step = o.step,
                 .clip = clipOf(o),
@@ -43,6 +48,7 @@ class NanoRenderer final : public MarchRenderer {
   NanoValues values_;
   float background_;
   PlaceBox box_;
+  std::optional<View> view_;  ///< of the picture that is drawn
   DeviceBuffer<std::byte> grid_;
 };
 

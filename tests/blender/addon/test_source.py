@@ -2,7 +2,7 @@
 import os
 
 import pytest
-from esvr_blender.source import Source, SourceError, grouped
+from esvr_blender.source import Source, SourceError, gaps_in, grouped, text_of_gaps
 
 
 def touch(folder, *names):
@@ -23,6 +23,16 @@ def test_a_pattern_has_the_files_of_its_very_names(tmp_path):
     assert list(source.files()) == [7, 10, 12345]
     assert source.files((8, 100)) == {10: str(tmp_path / "s.0010.esvr")}
     assert source.stem == "s"
+
+
+def test_files_that_look_like_frames_are_named(tmp_path):
+    touch(tmp_path, "s.0007.esvr", "s.0010.esvr", "s.0010.txt", "t.1.esvr", "s.a.esvr")
+    source = Source(str(tmp_path / "s.####.esvr"))
+    assert source.hint() == ""
+    touch(tmp_path, "s.9.esvr", "s.-003.esvr", "s.0008.50.esvr")
+    assert "s.-003.esvr and 2 more" in source.hint()
+    assert "s.9.esvr looked" in source.hint((9, 10)) and source.hint((10, 20)) == ""
+    assert Source(str(tmp_path / "s.9.esvr")).hint() == ""
 
 
 @pytest.mark.parametrize("pattern, name", [("s#.esvr", "s0003.esvr"), ("s@.esvr", "s3.esvr"), ("s@@.esvr", "s03.esvr"),
@@ -67,3 +77,11 @@ def test_numbers_of_different_lengths_have_the_pattern_of_the_shortest(tmp_path)
 
 def test_names_that_would_become_another_pattern_are_no_sequence(tmp_path):
     assert group(tmp_path, "a1#.esvr", "a2#.esvr") == [("a1#.esvr", None), ("a2#.esvr", None)]
+
+
+def test_gaps_between_frames_are_told():
+    assert gaps_in([1, 2, 3]) == [] and gaps_in([]) == [] and gaps_in([7]) == []
+    assert gaps_in([1, 2, 4, 9]) == [(3, 3), (5, 8)]
+    assert text_of_gaps("smoke", [1, 2, 3]) == ""
+    text = text_of_gaps("smoke", [1, 2, 4, 9])
+    assert "smoke" in text and "3, 5 to 8" in text and "--missing hold" in text

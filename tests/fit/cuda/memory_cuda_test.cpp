@@ -9,11 +9,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <future>
 
 #include "../random_ellipsoids.h"
 #include "../volumes.h"
 #include "core/cuda/memory_account.h"
 #include "core/cuda/memory_pool.h"
+#include "esvr/convert.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "fit/cuda/least_useful.h"
 #include "fit/cuda/memory_plan.h"
@@ -137,6 +139,40 @@ TEST_F(MemoryOnGpu, NothingIsHeldAfterAFitOrAFailure) {
     EXPECT_THROW(CudaOptimiser(target_, {}, {}), DeviceError);
   }
   EXPECT_EQ(memoryAccount().held(), before);
+}
+
+TEST_F(MemoryOnGpu, SlowASearchForAPsnrEndsWhereTheDeviceHoldsNoMoreEllipsoids) {
+  const SparseVolume volume = test::volumeOf({}, 8, 0.0f, [](Coord v) {
+    return float(std::max(0.0, 1.0 - std::hypot(v.x - 32, v.y - 32, v.z - 32) / 30.0));
+  });
+  const GridDescriptor descriptor;
+  ConvertOptions options;
+  options.goal = PsnrGoal{90.0};
+  options.representation = Representation::kEllipsoids;
+  options.fit.iterations = 100;
+  options.fit.device = device_;
+  options.fit.maxDeviceBytes = cuda::predictedBytes(makeTarget(volume, std::nullopt), 2000);
+  const Conversion conversion = convertVolume({descriptor, volume}, options);
+  EXPECT_EQ(conversion.fit.end, FitEnd::kPsnrMissed);
+  EXPECT_TRUE(conversion.fit.deviceFull);
+}
+
+TEST_F(MemoryOnGpu, FitsAtTheSameTimeHaveTheirOwnLimitsAndFigures) {
+  FitOptions small, large;
+  small.count = 50, large.count = 500;
+  for (FitOptions* options : {&small, &large}) {
+    options->iterations = 60;
+    options->device = device_;
+  }
+  small.maxDeviceBytes = cuda::predictedBytes(target_, 200);
+  const std::size_t alone = fit(volume_, small).deviceBytes;
+  auto other = std::async(std::launch::async, [&] { return fit(volume_, large); });
+  const FitResult limited = fit(volume_, small);
+  const FitResult free = other.get();
+  EXPECT_EQ(limited.deviceBytes, alone);
+  EXPECT_GT(free.deviceBytes, limited.deviceBytes);
+  EXPECT_FALSE(free.deviceFull);
+  EXPECT_EQ(free.field.ellipsoidCount(), fit(volume_, large).field.ellipsoidCount());
 }
 
 }  // namespace

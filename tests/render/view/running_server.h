@@ -14,13 +14,13 @@ namespace esvr::test {
 class RunningServer {
  public:
   explicit RunningServer(const std::vector<std::filesystem::path>& files,
-                         const view::ServerLimits& limits = {})
-      : collection_(files, {}),
+                         const view::ServerLimits& limits = {}, const cli::HostMemory& memory = {})
+      : collection_(files, memory),
         token_(view::randomToken()),
         service_(collection_, {{boost::asio::ip::address_v4::loopback(), 0},
                                {token_, {}},
                                limits,
-                               {selectDevice("cpu"), {}, {}, false, {}}}),
+                               {selectDevice("cpu"), {}, {}, false, memory}}),
         thread_([this] { service_.run(); }) {}
   ~RunningServer() {
     service_.stop();

@@ -145,8 +145,7 @@ TEST(ServerLimitsTest, ClientsBeyondTheLimitAreSentAwayUntilOneLeaves) {
 TEST(ServerLimitsTest, HalfRequestsAreClosedAfterTheirTime) {
   const test::ViewFiles files;
   ServerLimits limits;
-  limits.requestTime = std::chrono::milliseconds(50);
-  limits.connections = 2;
+  limits.guestTime = std::chrono::milliseconds(50);
   const test::RunningServer server({files / "blob.esvr"}, limits);
   const auto at = server.address();
   test::RawClient silent(at), half(at);
@@ -156,14 +155,60 @@ TEST(ServerLimitsTest, HalfRequestsAreClosedAfterTheirTime) {
   EXPECT_EQ(statusOf(answerTo(at, getRequest(at, "/" + at.token + "/"))), 200);
 }
 
-TEST(ServerLimitsTest, ConnectionsBeyondTheLimitAreClosedAtOnce) {
+TEST(ServerLimitsTest, AGuestBeyondTheLimitTakesThePlaceOfTheFirst) {
   const test::ViewFiles files;
   ServerLimits limits;
-  limits.connections = 2;
+  limits.guests = 2;
+  limits.guestTime = std::chrono::hours(1);
   const test::RunningServer server({files / "blob.esvr"}, limits);
-  const test::RawClient first(server.address()), second(server.address());
-  test::RawClient third(server.address());
-  EXPECT_EQ(third.receive(), "");
+  const auto at = server.address();
+  test::RawClient first(at), second(at), third(at);
+  EXPECT_EQ(first.receive(), "");
+  (void)third.send(getRequest(at, "/" + at.token + "/"));
+  EXPECT_EQ(statusOf(third.receive()), 200);
+  (void)second.send(getRequest(at, "/" + at.token + "/"));
+  EXPECT_EQ(statusOf(second.receive()), 200);
+}
+
+TEST(ServerLimitsTest, GuestsWithoutTheTokenKeepNobodyOut) {
+  const test::ViewFiles files;
+  ServerLimits limits;
+  limits.guestTime = std::chrono::hours(1);
+  const test::RunningServer server({files / "blob.esvr"}, limits);
+  const auto at = server.address();
+  std::vector<std::unique_ptr<test::RawClient>> idle;
+  for (std::size_t i = 0; i < 3 * limits.guests; ++i) {
+    idle.push_back(std::make_unique<test::RawClient>(at));
+    if (i % 2 == 0) (void)idle.back()->send("GET /wrong/ HTTP/1.1\r\nHost: 127.");
+    if (i % 16 == 0) {
+      EXPECT_EQ(statusOf(answerTo(at, getRequest(at, "/" + at.token + "/"))), 200);
+    }
+  }
+  test::ViewClient client(at);
+  EXPECT_EQ(client.draw(test::drawMessage(1)).back().head["type"], "picture");
+}
+
+TEST(ServerLimitsTest, PicturesKeepToTheMemoryOfTheProgram) {
+  const test::ViewFiles files;
+  constexpr std::uint64_t kBytes = 30 << 20;  // of one picture of 600 x 600, but not of two
+  const test::RunningServer server({files / "blob.esvr"}, {}, {kBytes, {}});
+  const auto message = [](int id, int side) {
+    auto draw = test::drawMessage(id);
+    draw["width"] = draw["height"] = side;
+    return draw;
+  };
+  test::ViewClient first(server.address()), second(server.address());
+  first.send(message(1, 600)), second.send(message(2, 600));
+  // Each gets its last picture, although only one of them has room between two passes.
+  for (test::ViewClient* client : {&first, &second}) {
+    nlohmann::json head;
+    do head = client->receive().head;
+    while (head["type"] == "picture" && head["last"] == false);
+    EXPECT_EQ(head["type"], "picture") << head;
+  }
+  const auto refused = first.draw(message(3, 1000)).back().head;
+  EXPECT_EQ(refused["type"], "failed");
+  EXPECT_THAT(refused["text"].get<std::string>(), HasSubstr("1000 x 1000 pixels"));
 }
 
 TEST(ServerStart, SaysWhichAddressCannotBeUsed) {

@@ -201,7 +201,7 @@ FitErrors CudaPaperOptimiser::measure() {
   return errors;
 }
 
-std::size_t CudaPaperOptimiser::deviceBytes() const { return peakMemory(); }
+std::size_t CudaPaperOptimiser::deviceBytes() const { return memory_.peak(); }
 
 paper::LossGradients CudaPaperOptimiser::gradients(std::size_t subvolume) {
   Part& part = *parts_[subvolume];
@@ -219,7 +219,6 @@ paper::LossGradients CudaPaperOptimiser::gradients(std::size_t subvolume) {
 std::unique_ptr<paper::PaperOptimiser> paper::makeCudaPaperOptimiser(const FitTarget& target,
                                                                      const PaperOptions& options) {
   cuda::useDevice(options.device);
-  cuda::forgetPeakMemory();
   PaperOptions chosen = options;
   chosen.visitOnly = chosen.visitOnly || !cuda::fitsInMemory(target, options.maxDeviceBytes);
   return std::make_unique<cuda::CudaPaperOptimiser>(target, chosen);

@@ -56,6 +56,7 @@ class CudaPaperOptimiser final : public paper::PaperOptimiser {
   paper::PaperOptions options_;
   Kernel kernel_;
   KernelConstants<double> constants_;
+  MemoryShare memory_;  ///< what the buffers below take
   KeepFreedMemory keep_;
   Stream stream_;
   std::vector<std::unique_ptr<Part>> parts_;

@@ -1,0 +1,87 @@
+#pragma once
+/// Loops on all threads that end when the token of the calling thread is set (esvr/progress.h). They
+/// are those of oneTBB. The decoder-only build has a file of this name with loops that nothing cancels.
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+#include <tbb/parallel_reduce.h>
+
+#include <utility>
+
+#include "esvr/progress.h"
+
+namespace esvr {
+
+/// To be called in every step of a long loop on one thread. A step should take at most a few
+/// milliseconds. \throws Cancelled  the token of the calling thread is set
+inline void throwIfCancelled() { CancelScope::check(); }
+
+/// Calls body(i) for every number from `first` to `last` - 1.
+template <class Index, class Body>
+void parallelFor(Index first, Index last, const Body& body) {
+  if (!(first < last)) return;
+  using Range = tbb::blocked_range<Index>;
+  tbb::parallel_for(Range(first, last), [&, token = CancelScope::token()](const Range& part) {
+    const CancelScope scope(token);
+    for (Index i = part.begin(); i != part.end(); ++i) {
+      throwIfCancelled();
+      body(i);
+    }
+  });
+}
+
+/// Calls body(part) for parts of a range.
+template <class Range, class Body>
+void parallelFor(const Range& range, const Body& body) {
+  tbb::parallel_for(range, [&, token = CancelScope::token()](const Range& part) {
+    const CancelScope scope(token);
+    throwIfCancelled();
+    body(part);
+  });
+}
+
+/// The values body(part, value) of parts of a range, joined by join(value, value).
+template <class Range, class Value, class Body, class Join>
+Value parallelReduce(const Range& range, const Value& identity, const Body& body,
+                     const Join& join) {
+  return tbb::parallel_reduce(
+      range, identity,
+      [&, token = CancelScope::token()](const Range& part, Value value) {
+        const CancelScope scope(token);
+        throwIfCancelled();
+        return body(part, std::move(value));
+      },
+      join);
+}
+
+/// The same, divided and joined in the same order on any number of threads.
+template <class Range, class Value, class Body, class Join>
+Value parallelDeterministicReduce(const Range& range, const Value& identity, const Body& body,
+                                  const Join& join) {
+  return tbb::parallel_deterministic_reduce(
+      range, identity,
+      [&, token = CancelScope::token()](const Range& part, Value value) {
+        const CancelScope scope(token);
+        throwIfCancelled();
+        return body(part, std::move(value));
+      },
+      join);
+}
+
+/// Calls two functions at the same time.
+template <class First, class Second>
+void parallelInvoke(const First& first, const Second& second) {
+  const CancelToken* const token = CancelScope::token();
+  tbb::parallel_invoke(
+      [&] {
+        const CancelScope scope(token);
+        first();
+      },
+      [&] {
+        const CancelScope scope(token);
+        second();
+      });
+}
+
+}  // namespace esvr
