@@ -23,6 +23,11 @@ VectorGrid readVector(const std::filesystem::path& path, const std::string& name
   return vdb::library().readVector(path, name, options);
 }
 
+PackedGrid readPacked(const std::filesystem::path& path, const std::string& name,
+                      const ReadOptions& options) {
+  return vdb::library().readPacked(path, name, options);
+}
+
 std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                      std::span<const std::size_t> places,
                                      const ReadOptions& options) {

@@ -43,6 +43,9 @@ class Library {
   [[nodiscard]] virtual VectorGrid readVector(const std::filesystem::path& path,
                                               const std::string& name,
                                               const ReadOptions& options) const = 0;
+  [[nodiscard]] virtual PackedGrid readPacked(const std::filesystem::path& path,
+                                              const std::string& name,
+                                              const ReadOptions& options) const = 0;
   [[nodiscard]] virtual std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                                              std::span<const std::size_t> places,
                                                              const ReadOptions& options) const = 0;

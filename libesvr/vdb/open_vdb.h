@@ -17,6 +17,8 @@ class OpenVdb final : public Library {
                                          const ReadOptions& options) const override;
   [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
                                       const ReadOptions& options) const override;
+  [[nodiscard]] PackedGrid readPacked(const std::filesystem::path& path, const std::string& name,
+                                      const ReadOptions& options) const override;
   [[nodiscard]] std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                                      std::span<const std::size_t> places,
                                                      const ReadOptions& options) const override;

@@ -67,7 +67,7 @@ bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) 
 }
 
 void countFromTree(Archive& archive, const ArchiveEntry& entry, GridSummary& grid) {
-  if (!isScalarFloatTree(entry) && !isVectorTree(entry)) return;
+  if (!isScalarFloatTree(entry) && !isVectorTree(entry) && !isIntegerTree(entry)) return;
   const TreeSurvey survey = surveyTree(archive, entry);
   grid.activeVoxels = survey.activeVoxels;
   grid.activeBox = survey.activeBox;
@@ -106,6 +106,16 @@ ValueType valueTypeOf(const GridSummary& grid) {
   return grid.savedAsHalf ? ValueType::kHalf : ValueType::kFloat;
 }
 
+/// The properties of a grid, without its background.
+GridDescriptor descriptorOf(const ListedArchive& listed, std::size_t i) {
+  const GridSummary& summary = listed.grids[i];
+  return {.name = summary.name,
+          .gridClass = summary.gridClass,
+          .valueType = valueTypeOf(summary),
+          .transform = listed.heads[i].transform,
+          .metadata = withoutFileStatistics(listed.heads[i].metadata)};
+}
+
 /// \param component  of a grid of vectors; 0 for others
 VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
                     const ReadOptions& options) {
@@ -113,12 +123,8 @@ VolumeGrid readTree(ListedArchive& listed, std::size_t i, std::size_t component,
   TreeVoxels voxels = readVoxels(listed.archive, listed.archive.entries()[i],
                                  {summary.gridClass, component}, options);
   VolumeGrid grid;
-  grid.descriptor.name = summary.name;
-  grid.descriptor.gridClass = summary.gridClass;
-  grid.descriptor.valueType = valueTypeOf(summary);
+  grid.descriptor = descriptorOf(listed, i);
   grid.descriptor.background = voxels.background;
-  grid.descriptor.transform = listed.heads[i].transform;
-  grid.descriptor.metadata = withoutFileStatistics(listed.heads[i].metadata);
   grid.volume = std::move(voxels.volume);
   grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
   return grid;
@@ -189,6 +195,27 @@ VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::s
 VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options) {
   ListedArchive listed = listGrids(Archive(file));
   return readListedVector(listed, findGrid(listed.grids, name), options);
+}
+
+PackedGrid readOpenVdbPacked(InputFile& file, const std::string& name, const ReadOptions& options) {
+  ListedArchive listed = listGrids(Archive(file));
+  const std::size_t i = findGrid(listed.grids, name);
+  ReadOptions mayBeEmpty = options;
+  mayBeEmpty.allowEmpty = true;
+  const ArchiveEntry& entry = listed.archive.entries()[i];
+  if (isVectorTree(entry)) {
+    if (listed.grids[i].activeVoxels == 0)
+      return {descriptorOf(listed, i), PackedVoxels<PackedVector>{}};
+    VectorGrid vectors = readListedVector(listed, i, mayBeEmpty);
+    return {std::move(vectors.descriptor), packed(vectors)};
+  }
+  return inGrid(listed.grids[i].uniqueName, [&]() -> PackedGrid {
+    if (!isIntegerTree(entry)) {
+      VolumeGrid grid = readListedGrid(listed, i, mayBeEmpty);
+      return {std::move(grid.descriptor), packed(grid.volume)};
+    }
+    return {descriptorOf(listed, i), readIntegers(listed.archive, entry, options)};
+  });
 }
 
 GridSummary OpenVdb::inspectCarried(const CarriedGrid& grid) const {

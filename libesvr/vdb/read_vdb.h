@@ -13,5 +13,6 @@ VolumeGrid readOpenVdbGrid(InputFile& file, const std::string& name, const ReadO
 VolumeGrid readOpenVdbComponent(InputFile& file, const std::string& name, std::size_t component,
                                 const ReadOptions& options);
 VectorGrid readOpenVdbVector(InputFile& file, const std::string& name, const ReadOptions& options);
+PackedGrid readOpenVdbPacked(InputFile& file, const std::string& name, const ReadOptions& options);
 
 }  // namespace esvr::vdb

@@ -2,33 +2,79 @@
 /// A grid of OpenVDB that holds no voxels: the leaves get them when they are written, one after the
 /// other. The tree of a large volume then takes a tenth of the memory of its voxels.
 
+#include "vdb/integer_trees.h"
 #include "vdb/scalar_trees.h"
 #include "vdb/vector_trees.h"
 
+#include <algorithm>
 #include <memory>
 #include <utility>
 
+#include "esvr/packed_grid.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
 namespace esvr::vdb {
 
+/// Voxels that a StreamedGrid writes have these functions: count() is the number of bricks, corner(b)
+/// and active(b) describe a brick, find(corner) is its number, and value(b, i, n) is the value at the
+/// offset i (voxelOffset), which is the n-th active one of the brick.
+
+/// The bricks of a volume.
+class VolumeBricks {
+ public:
+  explicit VolumeBricks(const SparseVolume& volume) : volume_(volume) {}
+
+  [[nodiscard]] std::size_t count() const { return volume_.brickCount(); }
+  [[nodiscard]] Coord corner(std::size_t b) const { return volume_.brickCorner(b); }
+  [[nodiscard]] const BrickMask& active(std::size_t b) const { return volume_.active[b]; }
+  [[nodiscard]] std::size_t find(Coord corner) const {
+    return findBrick(volume_, brickOf(corner) - brickOf(volume_.origin)).value();
+  }
+
+ private:
+  const SparseVolume& volume_;
+};
+
 /// The numbers of a volume, which must outlive this object.
-struct NumberVoxels {
+struct NumberVoxels : VolumeBricks {
+  explicit NumberVoxels(const SparseVolume& source) : VolumeBricks(source), volume(source) {}
+
   const SparseVolume& volume;
 
-  [[nodiscard]] const SparseVolume& bricks() const { return volume; }
-  [[nodiscard]] float value(std::size_t b, int i) const { return volume.brickValues(b)[i]; }
+  [[nodiscard]] float value(std::size_t b, int i, int) const { return volume.brickValues(b)[i]; }
 };
 
 /// Vectors whose components have the same bricks and active voxels (aligned()).
-struct VectorVoxels {
-  VectorVolume components;
+struct VectorVoxels : VolumeBricks {
+  explicit VectorVoxels(std::shared_ptr<const VectorVolume> aligned)
+      : VolumeBricks(aligned->front()), components(std::move(aligned)) {}
 
-  [[nodiscard]] const SparseVolume& bricks() const { return components.front(); }
-  [[nodiscard]] openvdb::Vec3s value(std::size_t b, int i) const {
-    const auto& [x, y, z] = components;
+  std::shared_ptr<const VectorVolume> components;
+
+  [[nodiscard]] openvdb::Vec3s value(std::size_t b, int i, int) const {
+    const auto& [x, y, z] = *components;
     return {x.brickValues(b)[i], y.brickValues(b)[i], z.brickValues(b)[i]};
+  }
+};
+
+/// The voxels of a PackedGrid, which must outlive this object.
+template <class T>
+struct StreamedPacked {
+  const PackedVoxels<T>& voxels;
+
+  [[nodiscard]] std::size_t count() const { return voxels.bricks.size(); }
+  [[nodiscard]] Coord corner(std::size_t b) const { return voxels.bricks[b].corner; }
+  [[nodiscard]] const BrickMask& active(std::size_t b) const { return voxels.bricks[b].active; }
+  [[nodiscard]] std::size_t find(Coord corner) const {
+    const auto at = std::ranges::lower_bound(voxels.bricks, corner, {}, &PackedBrick::corner);
+    return std::size_t(at - voxels.bricks.begin());
+  }
+  [[nodiscard]] auto value(std::size_t b, int, int n) const {
+    if constexpr (std::is_same_v<T, PackedVector>)
+      return openvdb::Vec3s(voxels.value(b, n).data());
+    else
+      return voxels.value(b, n);
   }
 };
 
@@ -37,15 +83,16 @@ template <class Leaf, class Voxels>
 std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
                                const typename Leaf::ValueType& background) {
   using Value = typename Leaf::ValueType;
-  const Coord corner = voxels.bricks().brickCorner(b);
+  const Coord corner = voxels.corner(b);
   auto leaf = std::make_unique<Leaf>(openvdb::Coord(corner.x, corner.y, corner.z), background);
-  const BrickMask& active = voxels.bricks().active[b];
+  const BrickMask& active = voxels.active(b);
+  int n = 0;
   for (int i = 0; i < kBrickVoxels; ++i)
-    if (active.test(i)) leaf->setValueOn(openvdb::Index(i), Value(voxels.value(b, i)));
+    if (active.test(i)) leaf->setValueOn(openvdb::Index(i), Value(voxels.value(b, i, n++)));
   return leaf;
 }
 
-/// \tparam Voxels  NumberVoxels or VectorVoxels
+/// \tparam Voxels  NumberVoxels, VectorVoxels or StreamedPacked
 template <class Tree, class Voxels>
 class StreamedGrid : public openvdb::Grid<Tree> {
  public:
@@ -56,7 +103,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
       : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
-    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) add(b, constantTiles, accessor);
+    for (std::size_t b = 0; b < voxels_.count(); ++b) add(b, constantTiles, accessor);
     if (constantTiles) mergeTiles();
   }
 
@@ -68,9 +115,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   void writeBuffers(std::ostream& stream) const override {
     for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
       const Coord corner{leaf->origin().x(), leaf->origin().y(), leaf->origin().z()};
-      const auto b =
-          findBrick(voxels_.bricks(), brickOf(corner) - brickOf(voxels_.bricks().origin));
-      makeLeaf<Leaf>(voxels_, b.value(), this->background())
+      makeLeaf<Leaf>(voxels_, voxels_.find(corner), this->background())
           ->writeBuffers(stream, this->saveFloatAsHalf());
     }
   }
@@ -79,22 +124,23 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   using Accessor = openvdb::tree::ValueAccessor<Tree>;
 
   void add(std::size_t b, bool constantTiles, Accessor& accessor) {
-    const BrickMask& active = voxels_.bricks().active[b];
+    const BrickMask& active = voxels_.active(b);
     const int count = active.count();
     if (count == 0) return;
-    const Coord c = voxels_.bricks().brickCorner(b);
+    const Coord c = voxels_.corner(b);
     const openvdb::Coord corner(c.x, c.y, c.z);
     constexpr openvdb::Index kTileOfABrick = 1;  // level in the tree
     if (constantTiles && count == kBrickVoxels && isConstant(b))
-      return accessor.addTile(kTileOfABrick, corner, Value(voxels_.value(b, 0)), true);
+      return accessor.addTile(kTileOfABrick, corner, Value(voxels_.value(b, 0, 0)), true);
     auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate{}, corner, this->background());
     leaf->setValueMask(maskOf(active));
     accessor.addLeaf(leaf.release());
   }
 
+  /// \param b  a brick whose voxels are all active
   [[nodiscard]] bool isConstant(std::size_t b) const {
     for (int i = 1; i < kBrickVoxels; ++i)
-      if (voxels_.value(b, i) != voxels_.value(b, 0)) return false;
+      if (voxels_.value(b, i, i) != voxels_.value(b, 0, 0)) return false;
     return true;
   }
 

@@ -2,6 +2,7 @@
 
 #include "vdb/versions.h"
 
+#include "vdb/integer_trees.h"
 #include "vdb/scalar_trees.h"
 #include "vdb/vector_trees.h"
 
@@ -49,10 +50,13 @@ struct LocatedTree {
 };
 
 ValueLayout layoutOf(const ArchiveEntry& owner, const GridHead& head) {
-  const bool isDouble = owner.valueType() == "double" || owner.valueType() == "vec3d";
+  const std::string type = owner.valueType();
+  const bool isDouble = type == "double" || type == "vec3d" || type == "int64";
+  const bool isBool = type == "bool";
   const std::uint64_t numbers = isVectorTree(owner) ? kComponents : 1;
-  return {numbers * (isDouble ? sizeof(double) : sizeof(float)),
-          numbers * sizeof(openvdb::math::half), owner.savedAsHalf, head.compression};
+  const std::uint64_t bytes = isDouble ? sizeof(double) : isBool ? sizeof(bool) : sizeof(float);
+  return {numbers * bytes, numbers * sizeof(openvdb::math::half), owner.savedAsHalf,
+          head.compression, isBool};
 }
 
 LocatedTree locateTree(Archive& archive, const ArchiveEntry& entry) {
@@ -176,6 +180,121 @@ class VoxelReader {
   Value background_{};
 };
 
+/// The leaves and the active tiles of a tree of integers.
+template <class Value>
+class IntegerTopology {
+ public:
+  struct Tile {
+    TileSource place;
+    Value value;
+  };
+
+  explicit IntegerTopology(InputFile& file) : file_(file) {}
+
+  void leaf(Coord corner, const LeafMask&) { leaves.push_back(corner); }
+
+  void rootTile(Coord corner, std::uint64_t at) {
+    const std::uint64_t back = file_.position();
+    file_.seek(at);
+    Stored value{};
+    file_.read(&value, sizeof value);
+    activeTiles.push_back({{corner, kUpperExtent}, Value(value)});
+    file_.seek(back);
+  }
+
+  template <int kLog2>
+  void tiles(const NodeMask<kLog2>& mask, const TileValues& place, std::int32_t extent) {
+    using OpenVdbMask = openvdb::util::NodeMask<kLog2>;
+    OpenVdbMask active;
+    for (openvdb::Index w = 0; w < mask.words.size(); ++w)
+      active.template getWord<openvdb::Index64>(w) = mask.words[w];
+    const auto values = std::make_unique<Value[]>(OpenVdbMask::SIZE);
+    file_.seek(place.at);
+    openvdb::io::readCompressedValues(file_.stream(), values.get(), OpenVdbMask::SIZE, active,
+                                      /*fromHalf=*/false);
+    file_.followStream();
+    mask.forEachSet([&](std::size_t n) {
+      activeTiles.push_back({{cellCorner<kLog2>(place.corner, n, extent), extent}, values[n]});
+    });
+  }
+
+  std::vector<Coord> leaves;  ///< in the file's order
+  std::vector<Tile> activeTiles;
+
+ private:
+  // A byte of a damaged file may be no truth value.
+  using Stored = std::conditional_t<std::is_same_v<Value, bool>, std::uint8_t, Value>;
+
+  InputFile& file_;
+};
+
+/// Reads the bricks of a tree of integers.
+template <class Tree>
+class IntegerReader {
+ public:
+  using Value = typename Tree::ValueType;
+
+  IntegerReader(InputFile& file, const LocatedTree& located) : file_(file), located_(located) {}
+
+  PackedVoxels<Value> read() {
+    openvdb::io::setDataCompression(file_.stream(), located_.head.compression);
+    file_.seek(located_.head.treeAt + sizeof(std::int32_t));
+    Value background{};
+    file_.read(&background, sizeof background);
+    made_.background = background;
+    openvdb::io::setGridBackgroundValuePtr(file_.stream(), &background);
+    file_.seek(located_.head.treeAt);
+    IntegerTopology<Value> topology(file_);
+    TreeWalk(file_, located_.layout, topology).topology();
+    file_.seek(file_.position());  // OpenVDB reads on from there
+    for (const Coord corner : topology.leaves) leaf(corner, background);
+    openvdb::io::setGridBackgroundValuePtr(file_.stream(), nullptr);
+    for (const auto& tile : topology.activeTiles) addTile(tile.place, tile.value);
+    std::ranges::sort(made_.bricks, {}, &PackedBrick::corner);
+    if (std::ranges::adjacent_find(made_.bricks, {}, &PackedBrick::corner) != made_.bricks.end())
+      throw BadInput("is damaged: two parts of the tree have the same voxels");
+    return std::move(made_);
+  }
+
+ private:
+  using Leaf = typename Tree::LeafNodeType;
+
+  void leaf(Coord corner, const Value& background) {
+    Leaf leaf(openvdb::PartialCreate{}, openVdbCoord(corner), background);
+    leaf.readBuffers(file_.stream());
+    BrickMask mask = LeafAccess<Leaf>{}.mask(leaf);
+    if constexpr (std::is_same_v<Value, bool>)
+      for (int i = 0; i < kBrickVoxels; ++i)
+        if (!leaf.getValue(openvdb::Index(i)))
+          mask.words[std::size_t(i >> 6)] &= ~(std::uint64_t{1} << (i & 63));
+    append(corner, mask, [&](int i) { return leaf.getValue(openvdb::Index(i)); });
+  }
+
+  void addTile(const TileSource& tile, Value value) {
+    if (std::is_same_v<Value, bool> && !value) return;
+    std::vector<Coord> corners;
+    appendBricks(tile, corners);
+    BrickMask all;
+    all.setAll();
+    for (const Coord corner : corners) append(corner, all, [&](int) { return value; });
+  }
+
+  template <class ValueAt>
+  void append(Coord corner, const BrickMask& mask, const ValueAt& valueAt) {
+    if (mask == BrickMask{}) return;
+    if (made_.parts.empty()) made_.parts.emplace_back();
+    auto& values = made_.parts.front();
+    made_.bricks.push_back({corner, mask, 0, values.size()});
+    if constexpr (!std::is_same_v<Value, bool>)
+      for (int i = 0; i < kBrickVoxels; ++i)
+        if (mask.test(i)) values.push_back(valueAt(i));
+  }
+
+  InputFile& file_;
+  const LocatedTree& located_;
+  PackedVoxels<Value> made_;
+};
+
 template <class Tree>
 TreeVoxels readVoxelsAs(Archive& archive, const LocatedTree& located, const WantedVoxels& wanted,
                         const ReadOptions& options) {
@@ -203,6 +322,23 @@ bool isScalarFloatTree(const ArchiveEntry& entry) {
 bool isVectorTree(const ArchiveEntry& entry) {
   return entry.treeType == openvdb::Vec3STree::treeType() ||
          entry.treeType == openvdb::Vec3DTree::treeType();
+}
+
+bool isIntegerTree(const ArchiveEntry& entry) {
+  return entry.treeType == openvdb::Int32Tree::treeType() ||
+         entry.treeType == openvdb::Int64Tree::treeType() ||
+         entry.treeType == openvdb::BoolTree::treeType();
+}
+
+AnyPackedVoxels readIntegers(Archive& archive, const ArchiveEntry& entry,
+                             const ReadOptions& options) {
+  const LocatedTree located = locateTree(archive, entry);
+  refuseTooLarge(located.survey.leaves + located.survey.tileBricks, options);
+  if (entry.treeType == openvdb::Int32Tree::treeType())
+    return IntegerReader<openvdb::Int32Tree>(archive.file(), located).read();
+  if (entry.treeType == openvdb::Int64Tree::treeType())
+    return IntegerReader<openvdb::Int64Tree>(archive.file(), located).read();
+  return IntegerReader<openvdb::BoolTree>(archive.file(), located).read();
 }
 
 TreeSurvey surveyTree(Archive& archive, const ArchiveEntry& entry) {

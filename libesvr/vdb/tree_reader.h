@@ -13,7 +13,10 @@ bool isScalarFloatTree(const ArchiveEntry& entry);
 /// True if the components of the grid's tree can be fitted.
 bool isVectorTree(const ArchiveEntry& entry);
 
-/// Surveys the tree of an entry for which isScalarFloatTree or isVectorTree is true.
+/// True if the grid's values are integers of 32 or 64 bits or truth values.
+bool isIntegerTree(const ArchiveEntry& entry);
+
+/// Surveys the tree of an entry for which one of the functions above is true.
 /// \throws BadInput  the tree is truncated or damaged
 TreeSurvey surveyTree(Archive& archive, const ArchiveEntry& entry);
 
@@ -29,6 +32,13 @@ struct WantedVoxels {
   GridClass gridClass = GridClass::kUnknown;
   std::size_t component = 0;  ///< of vectors; 0 for other values
 };
+
+/// Reads the active voxels of an entry for which isIntegerTree is true. Of a mask, those that are true
+/// count as active.
+/// \throws BadInput  the tree is damaged
+/// \throws MemoryExceeded  it takes more than options.maxBytes
+AnyPackedVoxels readIntegers(Archive& archive, const ArchiveEntry& entry,
+                             const ReadOptions& options);
 
 /// \throws BadInput  the tree is damaged or has no active voxel; voxels are not finite
 /// \throws MemoryExceeded  it takes more than options.maxBytes

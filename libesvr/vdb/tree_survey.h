@@ -25,6 +25,9 @@ struct ValueLayout {
   std::uint64_t halfBytes = 2;    ///< size of a value as half: 2 for float, 6 for vec3s, ...
   bool savedAsHalf = false;       ///< in blocks, not in the background and the root's tiles
   std::uint32_t compression = 0;  ///< OpenVDB's flags
+  /// True for truth values: a leaf then has its mask, its corner and a bit for each voxel, which are
+  /// not compressed.
+  bool leavesOfBits = false;
 };
 
 struct TreeSurvey {

@@ -92,6 +92,7 @@ class TreeWalk {
   /// Checks the values of a leaf. \throws BadInput  they are truncated or damaged
   void leafValues() {
     const auto mask = file_.read<LeafMask>();
+    if (layout_.leavesOfBits) return file_.skip(sizeof(Coord) + sizeof(LeafMask));
     valueBlock(mask);
   }
 

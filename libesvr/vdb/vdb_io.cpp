@@ -71,6 +71,16 @@ VectorGrid OpenVdb::readVector(const std::filesystem::path& path, const std::str
   return readVectors(path, [&](InputFile& file) { return readOpenVdbVector(file, name, options); });
 }
 
+PackedGrid OpenVdb::readPacked(const std::filesystem::path& path, const std::string& name,
+                               const ReadOptions& options) const {
+  return whileReading(path, [&] {
+    InputFile file(path);
+    if (formatOf(file) == FileFormat::kOpenVdb) return readOpenVdbPacked(file, name, options);
+    VolumeGrid grid = readNanoVdbGrid(file, name, options);
+    return PackedGrid{std::move(grid.descriptor), packed(grid.volume)};
+  });
+}
+
 std::vector<CarriedGrid> OpenVdb::readCarried(const std::filesystem::path& path,
                                               std::span<const std::size_t> places,
                                               const ReadOptions& options) const {

@@ -38,7 +38,7 @@ void addLeaves(const SparseVolume& volume, Tree& tree) {
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
     if (volume.active[b].count() > 0)
       accessor.addLeaf(
-          makeLeaf<typename Tree::LeafNodeType>(NumberVoxels{volume}, b, tree.background())
+          makeLeaf<typename Tree::LeafNodeType>(NumberVoxels(volume), b, tree.background())
               .release());
 }
 
@@ -49,7 +49,7 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
   const bool levelSet = source.descriptor.gridClass == GridClass::kLevelSet;
   // The flood fill of a level set needs the voxels of all leaves.
   if (voxels == LeafVoxels::kWhenWritten && !levelSet)
-    return std::make_shared<StreamedGrid<Tree, NumberVoxels>>(NumberVoxels{source.volume},
+    return std::make_shared<StreamedGrid<Tree, NumberVoxels>>(NumberVoxels(source.volume),
                                                               background, options.constantTiles);
   auto grid = openvdb::Grid<Tree>::create(background);
   Tree& tree = grid->tree();
@@ -103,7 +103,28 @@ GridBase::Ptr makeVectors(const VectorGrid& source, const WriteOptions& options)
   using Vector = typename Tree::ValueType;
   const openvdb::Vec3d background(source.background.data());
   return std::make_shared<StreamedGrid<Tree, VectorVoxels>>(
-      VectorVoxels{aligned(source.components)}, Vector(background), options.constantTiles);
+      VectorVoxels(std::make_shared<const VectorVolume>(aligned(source.components))),
+      Vector(background), options.constantTiles);
+}
+
+/// OpenVDB's tree for a type of PackedVoxels.
+template <class T>
+using TreeOf =
+    std::conditional_t<std::is_same_v<T, PackedVector>, openvdb::Vec3STree,
+                       typename openvdb::tree::Tree4<
+                           std::conditional_t<std::is_same_v<T, PackedVector>, float, T>>::Type>;
+
+template <class T>
+GridBase::Ptr makePacked(const PackedVoxels<T>& voxels, const WriteOptions& options) {
+  using Tree = TreeOf<T>;
+  const auto background = [&] {
+    if constexpr (std::is_same_v<T, PackedVector>)
+      return openvdb::Vec3s(voxels.background.data());
+    else
+      return voxels.background;
+  }();
+  return std::make_shared<StreamedGrid<Tree, StreamedPacked<T>>>(StreamedPacked<T>{voxels},
+                                                                 background, options.constantTiles);
 }
 
 }  // namespace
@@ -137,6 +158,14 @@ GridBase::Ptr makeOpenVdbGrid(const VectorGrid& source, const WriteOptions& opti
       refuseBeyondHalf(source.descriptor.name, source.background[c], source.components[c]);
   };
   chooseHalf(source.descriptor, options, fits, *grid);
+  return grid;
+}
+
+GridBase::Ptr makeOpenVdbGrid(const PackedGrid& source, const WriteOptions& options) {
+  initializeOpenVdb();
+  const GridBase::Ptr grid =
+      std::visit([&](const auto& voxels) { return makePacked(voxels, options); }, source.voxels);
+  restoreDescriptor(source.descriptor, *grid);
   return grid;
 }
 

@@ -27,6 +27,9 @@ std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
     if (const auto* vectors = std::get_if<const VectorGrid*>(&grid))
       throw UsageError("grid \"" + (*vectors)->descriptor.name +
                        "\" has vectors, which are not written to .nvdb files; ask for .vdb");
+    if (const auto* packed = std::get_if<const PackedGrid*>(&grid))
+      throw UsageError("grid \"" + (*packed)->descriptor.name +
+                       "\" holds packed voxels, which are not written to .nvdb files; unpack them");
     volumes.push_back(std::get<const VolumeGrid*>(grid));
   }
   return volumes;

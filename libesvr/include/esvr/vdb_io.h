@@ -14,6 +14,7 @@
 #include "esvr/carried_grid.h"
 #include "esvr/coord.h"
 #include "esvr/grid_descriptor.h"
+#include "esvr/packed_grid.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
@@ -100,6 +101,14 @@ struct VolumeGrid {
 [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
                                     const ReadOptions& options = {});
 
+/// Reads the active voxels of a grid in their type: of numbers as readGrid does, of vectors as
+/// readVector does, of integers ("int32", "int64") with all their bits, and the true ones of those of
+/// a mask ("bool"). The grid may have no active voxel.
+/// \throws BadInput  as for readGrid; the type is another one
+/// \throws MemoryExceeded  the grid needs more than maxBytes
+[[nodiscard]] PackedGrid readPacked(const std::filesystem::path& path, const std::string& name,
+                                    const ReadOptions& options = {});
+
 /// Reads grids of a .vdb file as bytes. Their types may be unknown to OpenVDB, and their trees are
 /// not checked.
 /// \param places   indices of the grids in VdbSummary::grids
@@ -141,16 +150,17 @@ struct WriteOptions {
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options = {});
 
-/// A grid that is written: one of numbers or of vectors, or one that is carried, whose bytes are
-/// written as they are. The grid must outlive this object.
-using GridToWrite = std::variant<const VolumeGrid*, const CarriedGrid*, const VectorGrid*>;
+/// A grid that is written: one of numbers or of vectors, one of any type whose active voxels are
+/// packed, or one that is carried, whose bytes are written as they are. The grid must outlive this object.
+using GridToWrite =
+    std::variant<const VolumeGrid*, const CarriedGrid*, const VectorGrid*, const PackedGrid*>;
 
 /// Writes grids of all kinds, in this order. A voxel of a grid of vectors is active if it is active
 /// in any component.
 /// \throws RuntimeFailure  as for writeGrids; a carried grid has a version of the VDB format that
 ///                         this version of OpenVDB does not write
-/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried or has
-///                      vectors
+/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried, packed or
+///                      has vectors
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const GridToWrite> grids, const WriteOptions& options = {});
 
