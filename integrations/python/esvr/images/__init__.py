@@ -1,5 +1,5 @@
-"""Images of microscopes, scanners and simulations as grids, and grids as images: the programs image2vdb and vdb2image.
+"""Images of microscopes, scanners and simulations as grids.
 
-image.py has the model of an image (axes, units, orientation, missing values), read_*.py have the readers of the formats,
-write.py has the writers, and image2vdb.py and vdb2image.py are the programs. docs/images.md has the conventions.
+image.py has the model of an image (axes, units, orientation, missing values), flat.py reads plain arrays of numbers, the
+modules read_*.py have the readers of the formats, and image2vdb.py and program.py are the program.
 """

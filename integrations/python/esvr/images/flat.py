@@ -66,8 +66,7 @@ class Spool:
 class Flat:
     """A function for Image.fetch: an array of a shape, the slowest axis first, from a place in a file.
 
-    compression is None, "deflate" (zlib or gzip) or "bzip2". skip is a number of bytes of the data after decompression;
-    end allows data that are cut short in that place only ("" for none).
+    compression is None, "deflate" (zlib or gzip) or "bzip2". skip is a number of bytes of the data after decompression.
     """
 
     def __init__(self, path, dtype, shape, offset=0, compression=None, skip=0):

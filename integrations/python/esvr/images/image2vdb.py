@@ -1,7 +1,6 @@
 """Images as grids: `python3 -m esvr.images.image2vdb IN... OUT.vdb`."""
 import argparse
 import os
-import re
 import sys
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 import esvr
 
 from . import program, read_science, read_tiff, read_volumes
-from .image import BRICK, CHANNEL, METRES, TIME, affine_of, factor, reading, unit_named
+from .image import BRICK, TIME, affine_of, factor, reading, unit_named
 from .program import Option, Program, byte_size, number
 
 EXACT = 2 ** 24  # up to here, floats hold every whole number
@@ -53,7 +52,7 @@ PROGRAM = Program(
      Option("background", "B", "value of inactive voxels (0); without --threshold, other values are active", number, default=0.0),
      Option("channel", "K", "which of several channels, colors or components, from 0 on", count),
      Option("time", "K", "which of several times, from 0 on", count),
-     Option("dataset", "PATH", "HDF5, netCDF, Zarr: the array; VTI: its name; DICOM: the series"),
+     Option("dataset", "PATH", "HDF5, netCDF: the array; VTI: its name"),
      Option("axes", "LETTERS", "what the axes are, the slowest first: tczyx; v for components of vectors"),
      Option("stored", "", "the stored numbers, not the calibrated values"),
      Option("as", "TYPE", "auto, float, integer or mask (auto)", word_of("auto", "float", "integer", "mask"), default="auto"),
@@ -68,8 +67,7 @@ PROGRAM = Program(
      Option("skip", "BYTES", "RAW: length of a header (0)", count, default=0),
      Option("max-memory", "SIZE", "limit on the memory of the image and of the grid (4G)", byte_size, default=4 * 10 ** 9),
      Option("force", "", "replace OUT.vdb if it exists", short="f")],
-    "TIFF, NIfTI, NRRD, MetaImage, MRC, DICOM, VTI, HDF5, netCDF, Zarr, NPY and RAW are read; docs/images.md has the "
-    "conventions. Values are calibrated, missing voxels are inactive, lengths are millimetres, and patients are RAS.",
+    "TIFF, NIfTI, NRRD, MetaImage, MRC, VTI, HDF5, netCDF, NPY and RAW are read. Values are calibrated, missing voxels are inactive, lengths are millimetres, and patients are RAS.",
     "  image2vdb cells.tif cells.vdb --unit um\n  image2vdb brain.nii.gz brain.vdb --threshold 40\n"
     "  image2vdb weather.nc t.vdb --dataset t --time 0")
 

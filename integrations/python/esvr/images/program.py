@@ -1,4 +1,4 @@
-"""What image2vdb and vdb2image share as programs: options, help, messages, exit codes, and a child process that survives
+"""What the program of this folder needs: options, help, messages, exit codes, and a child process that survives
 the faults of C libraries.
 
 A program is a table of options and a function that does the work. The messages and exit codes are those of the other

@@ -1,5 +1,4 @@
 """Readers of TIFF: OME-TIFF, ImageJ, tifffile's own and plain stacks, in one file or a file for each slice."""
-import glob
 import os
 import re
 
@@ -8,12 +7,11 @@ import numpy as np
 import esvr
 
 from .flat import Joined
-from .image import CHANNEL, METRES, TIME, Axis, Image, affine_of, factor, missing_if_any, need, product, reading, \
+from .image import CHANNEL, TIME, Axis, Image, affine_of, factor, missing_if_any, need, product, reading, \
     require_bytes, unit_named
 
 TIFF_AXES = {"X": "x", "Y": "y", "Z": "z", "C": CHANNEL, "S": "sample", "T": TIME, "Q": "page", "I": "page"}
 RESOLUTION_UNITS = {2: "in", 3: "cm"}
-INTERNAL = {"SizeZ", "SizeC", "SizeT"}
 
 
 def natural(name):
