@@ -93,7 +93,8 @@ int main(int, char** argv) {
   all += failInTurn("esvr_decode_box",
                     [&] { return esvr_decode_box(file, 0, box, 0, values, nullptr); });
   esvr_brick brick{};
-  all += failInTurn("esvr_get_brick", [&] { return esvr_get_brick(volume, 0, &brick); });
+  if (esvr_brick_count(volume) > 0)
+    all += failInTurn("esvr_get_brick", [&] { return esvr_get_brick(volume, 0, &brick); });
   all += failInTurn("esvr_sample", [&] { return esvr_sample(volume, 1, place, &value); });
   expect(all > 50, "all functions", all, "hardly anything was allocated");
 
