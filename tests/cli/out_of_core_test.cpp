@@ -15,8 +15,8 @@
 namespace esvr {
 namespace {
 
-constexpr std::int32_t kSide = 63;        // bricks; the voxels take 512 MB
-constexpr const char* kLimit = "170000";  // KB
+constexpr std::int32_t kSide = 66;        // bricks; the voxels take 589 MB
+constexpr const char* kLimit = "190000";  // KB
 constexpr const char* kMaxMemory = "100MB";
 
 /// A dense volume with a smooth field, in which no brick is constant.
