@@ -187,14 +187,6 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   return q;
 }
 
-QuantisedEllipsoids standingAlone(QuantisedEllipsoids q) {
-  const std::vector<std::size_t> order = fileOrder(q, {q.lattice, q.precision});
-  permute(order, q);
-  q.continues.clear();
-  q.motion = {};
-  return q;
-}
-
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q) {
   parallelFor(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) putIntensity(intensities[i], i, q);

@@ -115,7 +115,7 @@ bool saturates(const SparseVolume& volume) {
 }
 
 ActivityOptions activityOf(const Job& job) {
-  return {job.options.storage.activity, job.input.simplified, job.options.previous};
+  return {job.options.storage.activity, job.input.simplified};
 }
 
 Activity voxelActivity(const Job& job) {

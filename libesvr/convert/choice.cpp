@@ -6,7 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "convert/continued_search.h"
 #include "convert/exact_voxels.h"
 #include "convert/psnr_search.h"
 #include "convert/size_search.h"
@@ -286,8 +285,6 @@ PsnrCandidates psnrCandidates(const Job& job, const PsnrTarget& target) {
 
 Conversion convertToPsnr(const Job& job, const PsnrTarget& target) {
   const Representation wanted = representationOf(job);
-  if (mayContinue(job))
-    if (auto frame = continueTo(job, target.psnr)) return std::move(*frame);
   if (wanted == Representation::kEllipsoids)
     return std::move(*searchPsnr(job, target.psnr).conversion);
   if (wanted == Representation::kAuto && isLarge(job)) return smallerOfExactAnd(job, target.psnr);

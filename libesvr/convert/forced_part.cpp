@@ -62,9 +62,8 @@ PartState stateOfRotations(const StoredGrid& grid) {
 
 PartState stateOfLayers(const StoredGrid& grid) {
   const bool single = grid.field.chunks.size() == 1;
-  const bool divisible = single && grid.quantised.size() == 1 &&
-                         grid.quantised[0].size() >= kDivisible &&
-                         grid.quantised[0].continues.empty();
+  const bool divisible =
+      single && grid.quantised.size() == 1 && grid.quantised[0].size() >= kDivisible;
   return lacking(layerCount(grid) > 1, divisible,
                  "only quantised ellipsoids have layers, and it takes two of them");
 }

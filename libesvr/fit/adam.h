@@ -28,20 +28,13 @@ struct AdamOptions {
 /// First and second moments of one ellipsoid's gradient.
 struct AdamState {
   std::array<float, kParameters> m{}, v{};
-  std::uint32_t steps = 0;         ///< steps since the ellipsoid was placed
-  std::uint32_t start = kNoStart;  ///< its place in FitOptions::start; kNoStart for seeds
+  std::uint32_t steps = 0;  ///< steps since the ellipsoid was placed
 };
 
 /// Limits of the parameters.
 struct EllipsoidLimits {
   double smallestScale, largestScale;        ///< voxels
   double lowestIntensity, highestIntensity;  ///< units of the target
-};
-
-/// Keeps ellipsoids near the places where a fit began (start_penalty.h).
-struct StartPenalty {
-  const Ellipsoid* starts = nullptr;  ///< AdamState::start refers to them; borrowed
-  double weight = 0.0;                ///< 0: there is no penalty
 };
 
 /// The derivatives of one ellipsoid.
@@ -56,7 +49,6 @@ struct AdamStep {
   StepSizes sizes;
   AdamOptions options;
   EllipsoidLimits limits;
-  StartPenalty penalty{};
 };
 
 /// Takes one step with every ellipsoid.

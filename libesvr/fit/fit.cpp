@@ -1,9 +1,6 @@
 #include "esvr/fit.h"
 
-#include <span>
-#include <stdexcept>
 #include <string>
-#include <vector>
 
 #include "esvr/error.h"
 #include "fit/chunks/chunks_for.h"
@@ -25,48 +22,30 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options, const Tuning
   if (options.start) {
     plan.start = stateOf(importField(*options.start, origin, target.scale));
     plan.firstCount = plan.start.ellipsoids.size();
-    for (std::uint32_t i = 0; i < plan.firstCount; ++i) plan.start.adam[i].start = i;
   }
   plan.iterations = plannedIterations(options);
   plan.psnr = options.psnr;
   plan.seconds = options.seconds;
-  plan.learnKappa = !options.kappa && !options.keepsStart;
+  plan.learnKappa = !options.kappa;
   return plan;
-}
-
-/// The ellipsoids of the start that are still there, or kNoStart.
-/// \param all   the state at the end of the run
-/// \param kept  some of its ellipsoids, in the same order
-std::vector<std::uint32_t> startsOf(const FitState& all, std::span<const Ellipsoid> kept) {
-  std::vector<std::uint32_t> startOf;
-  std::size_t i = 0;
-  for (const Ellipsoid& p : kept) {
-    while (i < all.ellipsoids.size() && all.ellipsoids[i].center != p.center) ++i;
-    if (i == all.ellipsoids.size()) throw std::logic_error("a fit lost the order of ellipsoids");
-    startOf.push_back(all.adam[i++].start);
-  }
-  return startOf;
 }
 
 /// Fits all bricks together.
 FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
                    const TargetScale& scale) {
-  Tuning tuning;
-  if (options.keepsStart) tuning.relocateShare = tuning.keptRelocateShare;
+  const Tuning tuning;
   FitTarget target = makeTarget(volume, boxOf(volume, options.box), scale);
   applyOptions(options, target);
   Recorder recorder(target, options);
   const RunPlan plan = planFor(target, options, tuning, volume.origin);
   OptimiserOptions optimiserOptions{{}, options.seed, options.device, options.maxDeviceBytes};
   optimiserOptions.kernel.kappa = firstKappa(options, tuning);
-  if (options.keepsStart) optimiserOptions.starts = plan.start.ellipsoids;
 
   const auto optimiser = makeOptimiser(target, optimiserOptions, tuning);
   const RunEnd end = run(*optimiser, target, recorder, plan, tuning);
   const bool isCancelled = end.end == FitEnd::kCancelled;
   if (isCancelled && optimiser->ellipsoidCount() == 0) throw Cancelled();
   const BestSoFar completion;
-  const FitState all = options.start ? optimiser->state() : FitState{};
   if (!isCancelled) optimiser->dropUnseen();  // it takes as long as two iterations
   recorder.record(*optimiser, end.iterations);
 
@@ -75,7 +54,6 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   result.field = exportField(ellipsoids,
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
   result.field.fitFor = options.fitFor;
-  if (options.start && result.field.chunks.size() == 1) result.startOf = startsOf(all, ellipsoids);
   result.range = rangeOf(volume.background, target);
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;

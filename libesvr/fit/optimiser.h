@@ -22,9 +22,6 @@ struct OptimiserOptions {
   std::uint64_t seed = 1;
   Device device;
   std::optional<std::size_t> maxDeviceBytes;  ///< see CommonFitOptions
-  /// Ellipsoids near which those with AdamState::start are kept, in units of the target; they must
-  /// outlive the optimiser. Empty: there is no penalty.
-  std::span<const Ellipsoid> starts{};
 };
 
 /// Errors of a fit for its curve, in units of the target.

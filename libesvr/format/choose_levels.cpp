@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "core/brick_index.h"
 #include "core/parallel.h"
 #include "esvr/simplified_mask.h"
 #include "field/active_region.h"
@@ -138,9 +137,7 @@ class LevelSearch {
         sourceActive_(activeVoxelCount(task.source)),
         brickCosts_(costsOfBricks(tally)),
         bricks_(tally.bricks, brickCosts_, kEdgeOfBricks),
-        blocks_(placesOfBlocks(tally), tally.costs, 1.0) {
-    if (task.previous) expect(*task.previous);
-  }
+        blocks_(placesOfBlocks(tally), tally.costs, 1.0) {}
 
   std::optional<Levels> run() {
     double low = 0.0, high = 0.0;  // prices that suffice and do not; 0: none is known
@@ -163,28 +160,12 @@ class LevelSearch {
   }
 
  private:
-  void expect(const Levels& previous) {
-    std::vector<Coord> before;
-    for (const Coord corner : previous.bricks) before.push_back(brickOf(corner));
-    const BrickIndex index(before);
-    expected_.assign(tally_.costs.size(), LevelGraph::kNoLevel);
-    for (std::size_t b = 0; b < tally_.bricks.size(); ++b)
-      if (const auto at = index.find(tally_.bricks[b]); at != BrickIndex::kNone)
-        std::ranges::copy(previous.levels[at].of,
-                          expected_.begin() + std::ptrdiff_t(b * kBlocksOfBrick));
-    blocks_.expect(expected_);
-  }
-  [[nodiscard]] bool isExpected(std::size_t block) const {
-    return !expected_.empty() && expected_[block] != LevelGraph::kNoLevel;
-  }
-
   /// The levels of the blocks at a price, if they suffice.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> sufficient(double price) const {
     std::vector<std::uint8_t> ofBricks(tally_.bricks.size(), kMiddleLevel);
     bricks_.improve(price, ofBricks);
     std::vector<std::uint8_t> levels(tally_.costs.size());
-    for (std::size_t i = 0; i < levels.size(); ++i)
-      levels[i] = isExpected(i) ? expected_[i] : ofBricks[i / kBlocksOfBrick];
+    for (std::size_t i = 0; i < levels.size(); ++i) levels[i] = ofBricks[i / kBlocksOfBrick];
     blocks_.improve(price, levels);
     if (!(overlapOf(levels).iou() > kMinOverlap + kOverlapMargin)) return std::nullopt;
     return levels;
@@ -228,8 +209,6 @@ class LevelSearch {
   std::uint64_t sourceActive_;
   std::vector<LevelCosts> brickCosts_;
   LevelGraph bricks_, blocks_;
-  std::vector<std::uint8_t>
-      expected_;  ///< by block: that of the previous frame or kNoLevel; or empty
 };
 
 }  // namespace

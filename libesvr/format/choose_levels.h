@@ -19,7 +19,6 @@ struct LevelTask {
   const ThresholdPlace& place;  ///< its box is the active box of the source
   float base;                   ///< threshold of level 0, above 0
   double error;                 ///< error of the sum at active voxels (root mean square), above 0
-  const Levels* previous = nullptr;  ///< levels of the previous frame with the same base, if any
 };
 
 /// The levels that take the fewest bits among those found whose overlap with the source suffices

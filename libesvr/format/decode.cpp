@@ -5,7 +5,6 @@
 
 #include "esvr/error.h"
 #include "format/carried_record.h"
-#include "format/continued_grid.h"
 #include "format/ellipsoid_block.h"
 #include "format/frame_table.h"
 #include "format/grid_decoder.h"
@@ -76,22 +75,14 @@ void checkOrder(const SectionReader& sections, const EsvrFile& file) try {
   throw BadInput(sections.place(place) + ": " + fault.what());
 }
 
-/// The kind of the section of a grid that refers to the grid of the same number in the previous
-/// frame; nothing if the grid does not.
-std::optional<SectionKind> kindAfter(const SectionReader& sections, std::uint32_t g) {
-  for (const auto kind : {SectionKind::kPredicted, SectionKind::kContinued})
-    if (sections.has({kind, g})) return kind;
-  return std::nullopt;
-}
-
+/// Reads a grid that refers to the grid of the same number in the previous frame.
 StoredGrid readAfter(SectionReader& sections, const SectionId& section, const EsvrFile& previous) {
   const std::string where = sections.place(section);
   if (section.grid >= previous.grids.size())
     throw BadInput(where + ": the frame before has only " + std::to_string(previous.grids.size()) +
                    " grids");
-  const auto get = section.kind == SectionKind::kPredicted ? getPredicted : getContinuedGrid;
   StoredGrid grid =
-      get(sections.get(section), where, previous.grids[section.grid], sections.budget());
+      getPredicted(sections.get(section), where, previous.grids[section.grid], sections.budget());
   if (const auto fault = faultOf(grid)) throw BadInput(where + ": " + fault->text);
   return grid;
 }
@@ -136,13 +127,13 @@ std::vector<std::uint64_t> readGrids(SectionReader& sections, const ReadPart* pa
 void readGridsAfter(SectionReader& sections, const EsvrFile& previous, EsvrFile& file) {
   if (sections.has({SectionKind::kGridRecords})) file.layout = FileLayout::kCompact;
   GridRecords records(sections);
-  const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted) +
-                              sections.count(SectionKind::kContinued);
-  for (std::uint32_t g = 0; g < count; ++g)
-    if (const auto kind = kindAfter(sections, g))
-      file.grids.push_back(readAfter(sections, {*kind, g}, previous));
-    else
-      file.grids.push_back(decodeGrid({sections, records}, g, file.grids).grid);
+  const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted);
+  for (std::uint32_t g = 0; g < count; ++g) {
+    const SectionId difference{SectionKind::kPredicted, g};
+    file.grids.push_back(sections.has(difference)
+                             ? readAfter(sections, difference, previous)
+                             : decodeGrid({sections, records}, g, file.grids).grid);
+  }
 }
 
 CarriedBytes carriedBytesOf(const ReadLimits& limits) {

@@ -12,7 +12,6 @@
 #include "format/byte_writer.h"
 #include "format/carried_record.h"
 #include "format/chunk_box.h"
-#include "format/continued_grid.h"
 #include "format/curve_stream.h"
 #include "format/ellipsoids_section.h"
 #include "format/grid_record.h"
@@ -142,8 +141,7 @@ void addQuantised(SectionWriter& out, std::uint32_t g, std::uint32_t c, const So
   const QuantisedEllipsoids& q = grid.grid.quantised[c];
   if (q.size() == 0) return;
   if (q.layerEnds.empty())
-    out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired,
-               putEllipsoids(q.continues.empty() ? q : standingAlone(q)));
+    out.addRaw({SectionKind::kEllipsoids, g, c}, kRequired, putEllipsoids(q));
   else
     out.addRaw(
         {SectionKind::kLayered, g, c}, kRequired,
@@ -276,8 +274,7 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)
     if (differences[g])
-      out.addRaw({grids[g].grid.voxels ? SectionKind::kPredicted : SectionKind::kContinued, g},
-                 kRequired, std::vector(*differences[g]));
+      out.addRaw({SectionKind::kPredicted, g}, kRequired, std::vector(*differences[g]));
   if (!inherited.vectors) addVectors(out, file.vectors);
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
@@ -301,7 +298,7 @@ SectionWriter sectionsOf(const EsvrFile& file) {
 std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
                                                    const StoredGrid& previous,
                                                    std::uint64_t ownBytes) {
-  auto content = grid.voxels ? putPredicted(grid, previous) : putContinuedGrid(grid, previous);
+  auto content = putPredicted(grid, previous);
   if (content && content->size() + kFrameRowBytes >= ownBytes) content.reset();
   return content;
 }

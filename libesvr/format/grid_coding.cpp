@@ -86,29 +86,16 @@ bool fitsIntoMemory(const SparseVolume& source) {
   return !memoryOf(source).isInFile(source.values.size() * sizeof(float));
 }
 
-/// The levels of the previous frame, if they are near those of a grid with a threshold.
-const StoredGrid* previousLevels(const StoredGrid* previous, float threshold) {
-  constexpr float kNear = 4.0f;
-  if (!previous || previous->topology != TopologyKind::kBlocks) return nullptr;
-  const float before = thresholdAt(previous->activeThreshold, kMiddleLevel);
-  return threshold < before * kNear && before < threshold * kNear ? previous : nullptr;
-}
-
 /// Gives the blocks of a grid thresholds of their own. \return false if none suffice
-bool storeLevels(const SparseVolume& source, const ThresholdChoice& choice,
-                 const StoredGrid* previous, StoredGrid& grid) {
+bool storeLevels(const SparseVolume& source, const ThresholdChoice& choice, StoredGrid& grid) {
   constexpr double kLeastShare = 1e-3;  // of the threshold, where the sum is nearly exact
   const double sumError = errorOf(choice, grid);
   const float middle = choice.threshold > 0.0f ? choice.threshold : float(sumError);
   const double error = std::max(sumError, kLeastShare * middle);
-  const StoredGrid* before = previousLevels(previous, middle);
-  const float base = before ? before->activeThreshold : middle / thresholdAt(1.0f, kMiddleLevel);
+  const float base = middle / thresholdAt(1.0f, kMiddleLevel);
   if (!std::isnormal(base)) return false;
   const format::ThresholdPlace place = placeOf(grid);
-  const format::Levels levels =
-      before ? format::Levels{before->bricks, before->levels} : format::Levels{};
-  auto found = format::chooseLevels(
-      {source, grid.field, ruleOf(grid), place, base, error, before ? &levels : nullptr});
+  auto found = format::chooseLevels({source, grid.field, ruleOf(grid), place, base, error});
   if (!found || !format::areNear(found->bricks)) return false;
   grid.topology = TopologyKind::kBlocks;
   grid.activeThreshold = base;
@@ -130,7 +117,7 @@ void chooseTopology(const SparseVolume& source, const ActivityOptions& options, 
   grid.activeThreshold = choice.threshold;
   const bool needsMore = options.activity != Activity::kByValue && !isBand &&
                          !(choice.iou > kMinOverlap) && fitsIntoMemory(source);
-  if (needsMore && storeLevels(source, choice, options.previous, grid)) return;
+  if (needsMore && storeLevels(source, choice, grid)) return;
   if (needsMore && options.activity == Activity::kAuto)
     storeSimplifiedMask(source, errorOf(choice, grid), options.simplified, grid);
   else if (!(choice.iou > 0.0))

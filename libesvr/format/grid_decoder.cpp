@@ -244,8 +244,7 @@ class GridDecoder {
 
   void readLevels(StoredGrid& grid) {
     const auto section = id(SectionKind::kLevels);
-    Levels levels =
-        getLevels(sections_.get(section), sections_.place(section), {}, sections_.budget());
+    Levels levels = getLevels(sections_.get(section), sections_.place(section), sections_.budget());
     grid.bricks = std::move(levels.bricks);
     grid.levels = std::move(levels.levels);
   }

@@ -35,7 +35,6 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kCarriedBytes, "carried bytes"},
     {SectionKind::kPredicted, "predicted grid"},
     {SectionKind::kRelated, "related voxels"},
-    {SectionKind::kContinued, "continued ellipsoids"},
     {SectionKind::kLevels, "levels"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
@@ -74,7 +73,6 @@ std::uint16_t minorVersionOf(SectionKind kind) {
     case SectionKind::kGridRecords:
     case SectionKind::kPacked:
     case SectionKind::kRelated:
-    case SectionKind::kContinued:
     case SectionKind::kLevels:
       return 4;
     default:

@@ -50,7 +50,6 @@ enum class SectionKind : std::uint32_t {
   kCarriedBytes = 38,
   kPredicted = 39,
   kRelated = 41,
-  kContinued = 42,
   kLevels = 43,
   kSequenceIndex = 64,
 };

@@ -9,9 +9,6 @@
 namespace esvr::format {
 namespace {
 
-/// Edges between blocks that the level of the previous frame in the same place is worth
-/// (docs/lab-notes.md, "Thresholds of blocks").
-constexpr double kExpectedEdges = 3.0;
 /// After this many rounds hardly a level changes.
 constexpr int kMaxRounds = 12;
 
@@ -43,12 +40,10 @@ double LevelGraph::costOf(std::size_t node, std::uint8_t level, double price,
   double edges = 0.0;
   for (const std::uint32_t other : near_[node])
     edges += other != BrickIndex::kNone && levels[other] != level ? edge_ : 0.0;
-  if (isExpected(node) && expected_[node] != level) edges += kExpectedEdges;
   return costs_[node][level] + price * edges;
 }
 
-/// The best of the own level, those of the neighbours and of the previous frame, and the ends of the
-/// cheapest levels.
+/// The best of the own level, those of the neighbours, and the ends of the cheapest levels.
 std::uint8_t LevelGraph::best(std::size_t node, double price,
                               const std::vector<std::uint8_t>& levels) const {
   std::uint8_t found = levels[node];
@@ -60,7 +55,6 @@ std::uint8_t LevelGraph::best(std::size_t node, double price,
   };
   for (const std::uint32_t other : near_[node])
     if (other != BrickIndex::kNone) offer(levels[other]);
-  if (isExpected(node)) offer(expected_[node]);
   for (const std::uint8_t end : ends_[node]) offer(end);
   return found;
 }

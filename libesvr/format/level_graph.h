@@ -22,11 +22,6 @@ class LevelGraph {
   /// \param edge    what an edge is worth: 1 between blocks
   LevelGraph(std::span<const Coord> places, std::span<const LevelCosts> costs, double edge);
 
-  /// Gives nodes a level that the previous frame has in the same place, or kNoLevel. The list must
-  /// outlive the graph.
-  void expect(std::span<const std::uint8_t> levels) { expected_ = levels; }
-  static constexpr std::uint8_t kNoLevel = 255;
-
   /// Changes the level of one node after the other while that reduces the sum of costs. Nodes that are
   /// no neighbours change at the same time.
   /// \param price  cost of an edge of 1 between different levels
@@ -35,9 +30,6 @@ class LevelGraph {
  private:
   static constexpr int kNeighbours = 6;
 
-  [[nodiscard]] bool isExpected(std::size_t node) const {
-    return !expected_.empty() && expected_[node] != kNoLevel;
-  }
   [[nodiscard]] bool isDue(std::size_t node, int round, const std::vector<int>& changes) const;
   [[nodiscard]] std::uint8_t best(std::size_t node, double price,
                                   const std::vector<std::uint8_t>& levels) const;
@@ -48,7 +40,6 @@ class LevelGraph {
   double edge_;
   std::vector<std::array<std::uint32_t, kNeighbours>> near_;
   std::array<std::vector<std::size_t>, 2> byColor_;  ///< neighbours have different colors
-  std::span<const std::uint8_t> expected_;           ///< empty if nothing is expected
   std::vector<std::array<std::uint8_t, 2>> ends_;    ///< first and last of the cheapest levels
 };
 

@@ -13,8 +13,8 @@
 namespace esvr::format {
 namespace {
 
-/// Largest number of bricks for each byte of a section, besides those of the previous frame and their
-/// neighbours, so that a small section cannot ask for much memory.
+/// Largest number of bricks for each byte of a section, so that a small section cannot ask for much
+/// memory.
 constexpr std::uint64_t kMostBricksOfByte = 64;
 /// Memory that a reader takes for a brick: its levels, its position, and their places in lists.
 constexpr double kReaderBytesOfBrick = 128.0;
@@ -55,34 +55,32 @@ bool areNear(std::span<const Coord> corners) {
   return std::ranges::all_of(corners, [&](Coord c) { return codec::isInside(brickOf(c) - first); });
 }
 
-std::vector<std::byte> putLevels(const Levels& levels, const Levels& previous) {
+std::vector<std::byte> putLevels(const Levels& levels) {
   requireCodable(levels);
   const Coord first = firstOf(levels.bricks);
-  const codec::LevelBricks own = relativeTo(first, levels), past = relativeTo(first, previous);
   codec::Writer side;
-  codec::codeLevels(side, past, own);
+  codec::codeLevels(side, relativeTo(first, levels));
   ByteWriter out;
   for (const auto start : {first.x, first.y, first.z}) out.put(start);
   auto stream = side.coder.finish();
-  const std::uint64_t least =
-      (codec::newBricks(past, own) + kMostBricksOfByte - 1) / kMostBricksOfByte;
+  const std::uint64_t least = (levels.bricks.size() + kMostBricksOfByte - 1) / kMostBricksOfByte;
   stream.resize(std::max<std::uint64_t>(stream.size(), least));
   out.putAll(stream);
   return out.take();
 }
 
 Levels getLevels(std::span<const std::byte> content, const std::string& where,
-                 const Levels& previous, MemoryBudget& budget) {
+                 MemoryBudget& budget) {
   ByteReader in(content, where);
   Coord first;
   for (std::int32_t* start : {&first.x, &first.y, &first.z}) *start = in.get<std::int32_t>();
   const auto stream = in.getBytes(in.left());
-  const std::uint64_t maxNew = kMostBricksOfByte * stream.size();
-  budget.take(kReaderBytesOfBrick * double(maxNew + 7 * previous.bricks.size()), where);
+  const std::uint64_t maxBricks = kMostBricksOfByte * stream.size();
+  budget.take(kReaderBytesOfBrick * double(maxBricks), where);
   codec::Reader side{codec::RangeDecoder(stream)};
   Levels levels;
   try {
-    codec::LevelBricks read = codec::codeLevels(side, relativeTo(first, previous), maxNew);
+    codec::LevelBricks read = codec::codeLevels(side, maxBricks);
     levels.levels = std::move(read.levels);
     for (const Coord b : read.bricks)
       levels.bricks.push_back(

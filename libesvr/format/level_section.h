@@ -21,14 +21,12 @@ struct Levels {
 /// True if bricks lie near enough to each other for their levels to be stored: less than 2^24 voxels.
 [[nodiscard]] bool areNear(std::span<const Coord> corners);
 
-/// \param previous  levels of the previous frame, from which these hardly differ; without bricks if
-///                  there are none
 /// \throws RuntimeFailure  the corners are not multiples of 8, not increasing, or not near
-[[nodiscard]] std::vector<std::byte> putLevels(const Levels& levels, const Levels& previous = {});
+[[nodiscard]] std::vector<std::byte> putLevels(const Levels& levels);
 
 /// \throws BadInput  the content is damaged; the text begins with `where`
 /// \throws MemoryExceeded  the content may hold more bricks than the budget allows
 [[nodiscard]] Levels getLevels(std::span<const std::byte> content, const std::string& where,
-                               const Levels& previous, MemoryBudget& budget);
+                               MemoryBudget& budget);
 
 }  // namespace esvr::format

@@ -1,14 +1,12 @@
 #include "format/mask_section.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "codec/frame_coder.h"
 #include "codec/motion_search.h"
 #include "esvr/error.h"
 #include "format/bricks_stream.h"
-#include "format/predicted_stream.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {
@@ -51,9 +49,6 @@ Mask maskOf(VoxelLayer layer) {
   return mask;
 }
 
-/// Largest number of bricks: the previous mask, its neighbours and the stream limit it.
-constexpr auto kAnyMaskBricks = std::numeric_limits<std::uint64_t>::max();
-
 }  // namespace
 
 /// Stores the mask as a voxel layer with one value, so that only the activity of voxels takes
@@ -80,24 +75,6 @@ Mask getMask(std::span<const std::byte> content, const std::string& where, Memor
   return maskOf(std::move(layer));
 }
 
-bool canFollow(const Mask& mask, const Mask& previous) {
-  return codec::isPredictable(maskLayer(mask.bricks, mask.active),
-                              maskLayer(previous.bricks, previous.active));
-}
-
-std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
-                                    std::span<const BrickMask> active, const Mask& previous) {
-  requireBricks(bricks);
-  const VoxelLayer layer = maskLayer(bricks, active);
-  const VoxelLayer before = maskLayer(previous.bricks, previous.active);
-  if (!codec::isPredictable(layer, before))
-    throw RuntimeFailure("a mask lies too far from that of the previous frame");
-  ByteWriter out;
-  for (const auto start : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(start);
-  out.putAll(encodePredicted(layer, codec::PastVoxels(before, layer)));
-  return out.take();
-}
-
 std::vector<BrickMask> movedMask(const Mask& mask, const Mask& previous) {
   const VoxelLayer layer = maskLayer(mask.bricks, mask.active);
   const VoxelLayer before = maskLayer(previous.bricks, previous.active);
@@ -115,25 +92,6 @@ std::vector<BrickMask> movedMask(const Mask& mask, const Mask& previous) {
       if (cube.active[codec::PastCube<0>::cell(voxelLocal(v))]) moved[b].set(v);
   }
   return moved;
-}
-
-Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,
-                  const Mask& previous, MemoryBudget& budget) {
-  ByteReader in(content, where);
-  VoxelLayer layer = maskLayer({}, {});
-  layer.origin.x = in.get<std::int32_t>();
-  layer.origin.y = in.get<std::int32_t>();
-  layer.origin.z = in.get<std::int32_t>();
-  if (localOf(layer.origin) != Coord{}) in.fail("a mask begins within a brick");
-  layer.codes = VoxelArray<std::int32_t>(budget.voxels());
-  const VoxelLayer before = maskLayer(previous.bricks, previous.active);
-  if (!codec::isPredictable(layer, before)) in.fail("lies too far from the previous frame");
-  try {
-    decodePredicted(in, codec::PastVoxels(before, layer), kAnyMaskBricks, {where, budget}, layer);
-  } catch (const BadInput& error) {
-    in.fail(error.what());
-  }
-  return maskOf(std::move(layer));
 }
 
 }  // namespace esvr::format

@@ -25,22 +25,9 @@ struct Mask {
 [[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where,
                            MemoryBudget& budget);
 
-/// True if a mask can be stored as its difference from another one: it does not lie too far away.
-[[nodiscard]] bool canFollow(const Mask& mask, const Mask& previous);
-
-/// A mask as its difference from that of the previous frame, which usually takes fewer bytes.
-/// \param previous  the previous mask; without bricks if there is none
-/// \throws RuntimeFailure  as for putMask
-[[nodiscard]] std::vector<std::byte> putMaskAfter(std::span<const Coord> bricks,
-                                                  std::span<const BrickMask> active,
-                                                  const Mask& previous);
-
-/// The previous mask, moved as the mask of a frame has moved since: what putMaskAfter() expects.
-/// \return masks of the bricks of the frame; empty if its mask cannot follow the previous one
+/// The previous mask, moved as the mask of a frame has moved since: what the voxels of the frame are
+/// predicted to be.
+/// \return masks of the bricks of the frame; empty if its mask lies too far from the previous one
 [[nodiscard]] std::vector<BrickMask> movedMask(const Mask& mask, const Mask& previous);
-
-/// \throws BadInput, MemoryExceeded  as for getMask
-[[nodiscard]] Mask getMaskAfter(std::span<const std::byte> content, const std::string& where,
-                                const Mask& previous, MemoryBudget& budget);
 
 }  // namespace esvr::format

@@ -1,14 +1,13 @@
 /// Compares frames that are predicted from the frame before with files of their own.
 ///
-///     bench_frames GRID KIND PSNR STEADINESS GOP DEVICE FILE...
+///     bench_frames GRID PSNR STEADINESS GOP DEVICE FILE...
 ///
-/// The files are those of a sequence, in its order. KIND is "voxels" or "ellipsoids", or
-/// "ellipsoids-by-value", which stores no mask of active voxels. The grid of each file is converted
-/// to a PSNR (dB) over the box twice, on DEVICE ("cpu", "cuda"): alone, and as a frame of a group of
-/// GOP frames of which the first one stands alone. For both ways a line of JSON is printed: the
-/// bytes of all files and frames, the least and the mean PSNR of a frame, the PSNR of the change
-/// from one frame to the next, of which the peak is that of the frame, and the seconds of the
-/// conversions and of encoding.
+/// The files are those of a sequence, in its order. The grid of each file is converted to voxels of a
+/// PSNR (dB) over the box twice, on DEVICE ("cpu", "cuda"): alone, and as a frame of a group of GOP
+/// frames of which the first one stands alone. For both ways a line of JSON is printed: the bytes of
+/// all files and frames, the least and the mean PSNR of a frame, the PSNR of the change from one frame
+/// to the next, of which the peak is that of the frame, and the seconds of the conversions and of
+/// encoding.
 
 #include <algorithm>
 #include <chrono>
@@ -29,22 +28,8 @@
 namespace esvr {
 namespace {
 
-/// What the frames are stored as.
-struct Kind {
-  Representation representation = Representation::kVoxels;
-  Activity activity = Activity::kAuto;
-};
-
-Kind kindOf(const std::string& name) {
-  if (name == "voxels") return {};
-  if (name == "ellipsoids") return {Representation::kEllipsoids};
-  if (name == "ellipsoids-by-value") return {Representation::kEllipsoids, Activity::kByValue};
-  throw UsageError("unknown kind of frames: " + name);
-}
-
 struct Settings {
   std::string grid;
-  Kind kind;
   double psnr = 0.0, steadiness = 0.0;
   std::size_t framesOfGroup = 1;
   Device device{};
@@ -90,9 +75,9 @@ class Run {
     const auto start = std::chrono::steady_clock::now();
     const EsvrFile* previous = alone ? nullptr : &before_;
     ConvertOptions options{.goal = PsnrGoal{settings_.psnr},
-                           .representation = settings_.kind.representation,
+                           .representation = Representation::kVoxels,
                            .fit = {},
-                           .storage = {.activity = settings_.kind.activity},
+                           .storage = {},
                            .previous = previous ? &previous->grids.front() : nullptr,
                            .steadiness = settings_.steadiness};
     options.fit.device = settings_.device;
@@ -152,14 +137,14 @@ void compare(Settings settings, const std::vector<std::string>& files) {
 }  // namespace esvr
 
 int main(int count, char** arguments) try {
-  if (count < 9) {
-    std::cerr << "usage: bench_frames GRID KIND PSNR STEADINESS GOP DEVICE FILE FILE...\n";
+  if (count < 8) {
+    std::cerr << "usage: bench_frames GRID PSNR STEADINESS GOP DEVICE FILE FILE...\n";
     return EXIT_FAILURE;
   }
-  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[5]), 1));
-  esvr::compare({arguments[1], esvr::kindOf(arguments[2]), std::atof(arguments[3]),
-                 std::atof(arguments[4]), framesOfGroup, esvr::selectDevice(arguments[6])},
-                {arguments + 7, arguments + count});
+  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[4]), 1));
+  esvr::compare({arguments[1], std::atof(arguments[2]), std::atof(arguments[3]), framesOfGroup,
+                 esvr::selectDevice(arguments[5])},
+                {arguments + 6, arguments + count});
   return EXIT_SUCCESS;
 } catch (const esvr::Error& error) {
   std::cerr << "bench_frames: " << error.what() << "\n";

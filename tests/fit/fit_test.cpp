@@ -272,64 +272,6 @@ TEST(Fit, FollowsTheBandOfALevelSetAndNothingBeyond) {
   EXPECT_GT(banded.psnrActive, plain.psnrActive + 2.0);
 }
 
-/// The ellipsoids of a result that are those of its start.
-std::size_t keptBy(const FitResult& result) {
-  return std::size_t(std::ranges::count_if(result.startOf, [](auto i) { return i != kNoStart; }));
-}
-
-/// A fit of the next frame, which continues from the fit of a frame.
-FitResult nextOf(const FitResult& first, const SparseVolume& volume, bool keepsStart) {
-  FitOptions options = quick(first.field.ellipsoidCount());
-  options.kappa.reset();
-  options.start = &first.field;
-  options.keepsStart = keepsStart;
-  return fit(volume, options);
-}
-
-TEST(Fit, SaysWhichEllipsoidsOfItsStartItHasKept) {
-  const FitResult first = fit(test::tubeVolume(), quick(100));
-  EXPECT_TRUE(first.startOf.empty());
-  for (const bool keepsStart : {false, true}) {
-    const FitResult next = nextOf(first, test::tubeVolume(), keepsStart);
-    ASSERT_EQ(next.field.chunks.size(), 1u);
-    ASSERT_EQ(next.startOf.size(), next.field.ellipsoidCount());
-    std::int64_t last = -1;
-    for (const std::uint32_t i : next.startOf) {
-      if (i == kNoStart) continue;
-      EXPECT_GT(std::int64_t(i), last);
-      EXPECT_LT(i, first.field.ellipsoidCount());
-      last = i;
-    }
-  }
-}
-
-/// The volume is the same, so that there is little to improve: the ellipsoids stay about where they
-/// are, much nearer than ellipsoids of the tube are to each other.
-TEST(Fit, KeepsTheEllipsoidsOfItsStart) {
-  const FitResult first = fit(test::tubeVolume(), quick(100));
-  const FitResult next = nextOf(first, test::tubeVolume(), true);
-  EXPECT_GT(10 * keptBy(next), 8 * first.field.ellipsoidCount());
-  const Ellipsoids& start = first.field.chunks[0].ellipsoids;
-  const Ellipsoids& end = next.field.chunks[0].ellipsoids;
-  std::vector<double> distances;
-  for (std::size_t k = 0; k < next.startOf.size(); ++k) {
-    const std::uint32_t i = next.startOf[k];
-    if (i == kNoStart) continue;
-    distances.push_back(std::hypot(end.center[0][k] - start.center[0][i],
-                                   end.center[1][k] - start.center[1][i],
-                                   end.center[2][k] - start.center[2][i]));
-  }
-  std::ranges::sort(distances);
-  EXPECT_LT(distances[distances.size() / 2], 0.5);
-  EXPECT_LT(distances.back(), 10.0);
-}
-
-TEST(Fit, ReplacesMoreEllipsoidsOfAStartThatItNeedNotKeep) {
-  const FitResult first = fit(test::tubeVolume(), quick(100));
-  EXPECT_GT(keptBy(nextOf(first, test::tubeVolume(), true)),
-            keptBy(nextOf(first, test::tubeVolume(), false)));
-}
-
 TEST(Fit, SplitsAWideGridIntoChunks) {
   std::vector<BrickInput> bricks;
   for (const int x : {0, 40'000}) {

@@ -1,6 +1,6 @@
 // Plan: where errors differ from place to place, a threshold for each block restores the active voxels
-// and one for all does not; the choice is the same for any number of threads; levels of the previous
-// frame make it cheaper; active voxels that do not depend on the values have no thresholds.
+// and one for all does not; the choice is the same for any number of threads; active voxels that do not
+// depend on the values have no thresholds.
 #include "format/choose_levels.h"
 
 #include <gtest/gtest.h>
@@ -15,8 +15,6 @@
 
 namespace esvr {
 namespace {
-
-using format::Levels;
 
 /// Blobs whose sum is active where it exceeds a threshold that grows along x.
 SparseVolume uneven(const Field& field) {
@@ -43,9 +41,9 @@ Field blobs() {
   return field;
 }
 
-StoredGrid stored(Activity activity, const StoredGrid* previous = nullptr) {
+StoredGrid stored(Activity activity) {
   const Field field = blobs();
-  return makeStoredGrid({}, uneven(field), field, {activity, nullptr, previous});
+  return makeStoredGrid({}, uneven(field), field, {activity});
 }
 
 double overlapOf(const StoredGrid& grid) {
@@ -72,15 +70,6 @@ TEST(ChooseLevels, AreTheSameForAnyNumberOfThreads) {
   const auto one = test::onThreads(1, levels);
   EXPECT_EQ(one, test::onThreads(2, levels));
   EXPECT_EQ(one, test::onThreads(5, levels));
-}
-
-TEST(ChooseLevels, ThoseOfThePreviousFrameAreKept) {
-  const StoredGrid first = stored(Activity::kAuto);
-  const StoredGrid next = stored(Activity::kAuto, &first);
-  ASSERT_EQ(next.topology, TopologyKind::kBlocks);
-  EXPECT_EQ(next.activeThreshold, first.activeThreshold);
-  const Levels before{first.bricks, first.levels}, now{next.bricks, next.levels};
-  EXPECT_LT(5 * format::putLevels(now, before).size(), format::putLevels(now).size());
 }
 
 // Every second voxel is active, whatever its value.

@@ -80,21 +80,5 @@ TEST(LevelGraph, NoSingleChangeToANeighboursLevelReducesTheSum) {
   }
 }
 
-TEST(LevelGraph, TheLevelOfThePreviousFrameIsWorthThreeEdges) {
-  const std::vector<Coord> places{{0, 0, 0}};
-  std::vector<LevelCosts> costs(1);
-  for (int k = 0; k < kLevelCount; ++k) costs[0][std::size_t(k)] = k == 7 ? 0.0f : 1.0f;
-  const std::vector<std::uint8_t> expected{9};
-  LevelGraph graph(places, costs, 1.0);
-  graph.expect(expected);
-  const auto levelAt = [&](double price) {
-    std::vector<std::uint8_t> levels{kMiddleLevel};
-    graph.improve(price, levels);
-    return int(levels[0]);
-  };
-  EXPECT_EQ(levelAt(0.3), 7);
-  EXPECT_EQ(levelAt(0.4), 9);
-}
-
 }  // namespace
 }  // namespace esvr::format

@@ -1,6 +1,5 @@
-// Plan: levels come back from a section anywhere in the index space, alone and after those of another
-// frame; what cannot be stored is refused, and so are damaged sections and those that need too much
-// memory.
+// Plan: levels come back from a section anywhere in the index space; what cannot be stored is refused,
+// and so are damaged sections and those that need too much memory.
 #include "format/level_section.h"
 
 #include <gtest/gtest.h>
@@ -19,9 +18,9 @@ Levels levelsAt(Coord first, int count) {
   return levels;
 }
 
-Levels readBack(const std::vector<std::byte>& content, const Levels& previous = {}) {
+Levels readBack(const std::vector<std::byte>& content) {
   MemoryBudget budget(kNoMemoryLimit);
-  return getLevels(content, "levels", previous, budget);
+  return getLevels(content, "levels", budget);
 }
 
 void expectSame(const Levels& a, const Levels& b) {
@@ -34,14 +33,6 @@ TEST(LevelSection, LevelsComeBackAnywhere) {
   for (const Coord first : {Coord{}, Coord{-8, 16, -1024}, Coord{kLow, kHigh, kLow}})
     expectSame(readBack(putLevels(levelsAt(first, 40))), levelsAt(first, 40));
   expectSame(readBack(putLevels({})), {});
-}
-
-TEST(LevelSection, LevelsComeBackAfterThoseOfAFrameElsewhere) {
-  const Levels here = levelsAt({-64, 8, 0}, 50);
-  for (const Coord first : {Coord{-64, 8, 0}, Coord{-56, 8, 8}, Coord{1 << 30, 0, -(1 << 30)}}) {
-    const Levels now = levelsAt(first, 45);
-    expectSame(readBack(putLevels(now, here), here), now);
-  }
 }
 
 TEST(LevelSection, BricksThatAreFarApartAreRefused) {
@@ -70,7 +61,7 @@ TEST(LevelSection, BricksBeyondTheIndexSpaceAreRefused) {
 
 TEST(LevelSection, TheMemoryIsCheckedBeforeItIsTaken) {
   MemoryBudget budget(1000);
-  EXPECT_THROW((void)getLevels(putLevels(levelsAt({}, 100)), "levels", {}, budget), MemoryExceeded);
+  EXPECT_THROW((void)getLevels(putLevels(levelsAt({}, 100)), "levels", budget), MemoryExceeded);
 }
 
 }  // namespace

@@ -1,17 +1,16 @@
-// Writes the golden files: make_golden FOLDER SEQUENCE.esvr CONTINUED.esvr. After a release it is used
-// for new files only, because existing ones must not change within a version of the format.
+// Writes the golden files: make_golden FOLDER SEQUENCE.esvr. After a release it is used for new files
+// only, because existing ones must not change within a version of the format.
 
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 
-#include "format/continued_samples.h"
 #include "format/golden_files.h"
 #include "format/sequence_samples.h"
 
 int main(int argc, char** argv) {
-  if (argc != 4) {
-    std::cerr << "usage: make_golden FOLDER SEQUENCE.esvr CONTINUED.esvr\n";
+  if (argc != 3) {
+    std::cerr << "usage: make_golden FOLDER SEQUENCE.esvr\n";
     return 2;
   }
   for (const auto& golden : esvr::test::goldenFiles()) {
@@ -21,5 +20,4 @@ int main(int argc, char** argv) {
     if (!out.flush()) return 1;
   }
   esvr::test::writeGoldenSequence(argv[2]);
-  esvr::test::writeContinuedSequence(argv[3]);
 }

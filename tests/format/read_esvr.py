@@ -530,7 +530,7 @@ def level(stream, held, brick, n):
 
 
 def levels(data):
-    """The levels of the blocks of bricks, without a previous frame: {(brick, block): level}."""
+    """The levels of the blocks of bricks: {(brick, block): level}."""
     origin = struct.unpack_from("<3i", data)
     stream = Decoder(data[12:])
     count, held = stream.number("count", bits=6), {}

@@ -48,7 +48,7 @@ class Hash {
 };
 
 static_assert(sizeof(Ellipsoid) == 13 * sizeof(double));
-static_assert(sizeof(AdamState) == (2 * kParameters + 2) * sizeof(float));
+static_assert(sizeof(AdamState) == (2 * kParameters + 1) * sizeof(float));
 
 void addOptions(Hash& hash, const FitOptions& options) {
   hash.add(options.seed);

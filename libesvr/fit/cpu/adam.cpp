@@ -2,7 +2,6 @@
 
 #include "core/parallel.h"
 #include "fit/adam_math.h"
-#include "fit/start_penalty.h"
 
 namespace esvr {
 
@@ -12,9 +11,9 @@ void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
   parallelFor(Range(0, ellipsoids.size(), 64), [&](const Range& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       Ellipsoid& p = ellipsoids[i];
-      const ParameterVector gradient = penalised(gradients[i], p, states[i].start, step.penalty);
       const ParameterVector largest = largestStep(p, step.sizes);
-      moveWithin(p, adamDirection(states[i], gradient, step.options, largest), step.limits);
+      moveWithin(p, adamDirection(states[i], gradients[i].byParameter, step.options, largest),
+                 step.limits);
     }
   });
 }

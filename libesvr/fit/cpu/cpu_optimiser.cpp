@@ -52,12 +52,8 @@ bool CpuOptimiser::anyOutgrown() const {
 void CpuOptimiser::step(double factor) {
   const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
   const std::vector<Ellipsoid> before = ellipsoids_;
-  const double weight = options_.starts.empty() ? 0.0 : tuning_.startPenalty;
   adamStep(ellipsoids_, states_, gradients_,
-           {.sizes = tuning_.steps.scaled(factor),
-            .options = tuning_.adam,
-            .limits = limits_,
-            .penalty = {options_.starts.data(), weight}});
+           {.sizes = tuning_.steps.scaled(factor), .options = tuning_.adam, .limits = limits_});
   std::atomic<std::uint32_t> refused = 0;
   parallelFor(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     if (refuseStep(listed_[i], core, before[i], ellipsoids_[i])) ++refused;

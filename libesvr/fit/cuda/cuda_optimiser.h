@@ -96,7 +96,6 @@ class CudaOptimiser final : public Optimiser {
   ThreadsPerBrick threads_;
   DeviceBuffer<float> targetValues_, constants_;
   DeviceBuffer<BrickMask> active_;
-  DeviceBuffer<Ellipsoid> starts_;
   GrowingBuffer<Ellipsoid> ellipsoids_;
   GrowingBuffer<AdamState> adam_;
   GrowingBuffer<PairForm> forms_;

@@ -7,7 +7,6 @@
 #include "fit/cuda/moment_sums.cuh"
 #include "fit/motion_bound.h"
 #include "fit/parameter_gradient.h"
-#include "fit/start_penalty.h"
 
 namespace esvr::cuda {
 namespace {
@@ -52,8 +51,7 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
   AdamState adam = a.states[i];
   const EllipsoidGradient gradient = ellipsoidGradient(a.forms[i].form, sums, a.edge.slope);
   const ParameterVector largest = largestStep(p, a.sizes.scaled(a.factor));
-  const ParameterVector total = penalised(gradient, p, adam.start, a.penalty);
-  moveWithin(p, adamDirection(adam, total, a.adam, largest), a.limits);
+  moveWithin(p, adamDirection(adam, gradient.byParameter, a.adam, largest), a.limits);
   if (!finite(p)) *a.diverged = 1;  // integer sums would hide it
   if (refuseStep(a.listed[i], a.core, before, p) && atomicAdd(a.refused, 1u) + 1 == a.maxRefused)
     *a.halts = 1;

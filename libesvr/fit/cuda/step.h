@@ -39,7 +39,6 @@ struct StepArguments {
   StepSizes sizes;
   AdamOptions adam;
   EllipsoidLimits limits;
-  StartPenalty penalty;
   ListedSupport* listed;     ///< an ellipsoid's, in the lists
   double core;               ///< radius within which no list may miss anything
   std::uint32_t* refused;    ///< steps that were refused since the lists were built

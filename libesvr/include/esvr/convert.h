@@ -108,9 +108,7 @@ struct ConvertOptions {
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
   /// Another grid that this one refers to in its file may take its place (voxel_reference.h).
   /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal, a PsnrGoal and a
-  /// BoundGoal, so that only the first frame of a group takes the time of a fit. If it holds
-  /// quantised ellipsoids, a PresetGoal and a PsnrGoal fit these to the frame, which takes a
-  /// fraction of the time of a fit from seeds.
+  /// BoundGoal, so that only the first frame of a group takes the time of a fit.
   const StoredGrid* previous = nullptr;
   /// Weight of the error of the change since the previous frame, from 0 (least bytes) to 1 (least
   /// flicker), if there is one. Voxels then keep a part of the errors of the previous frame.
@@ -137,7 +135,7 @@ struct InputKey {
 /// The outcome of quantising the ellipsoids.
 struct CompactRecord {
   double loss = 0.0;     ///< loss of PSNR over the box against float32, dB
-  QuantiserSteps steps;  ///< quantisation steps of the four streams; 0: those of the previous frame
+  QuantiserSteps steps;  ///< quantisation steps of the four streams
 };
 
 /// A grid that was considered for a goal.

@@ -82,23 +82,13 @@ struct FitOptions : CommonFitOptions {
   /// edge, and adds ellipsoids until there are `count`. The field must outlive the call. Null: the
   /// fit begins with seeds.
   const Field* start = nullptr;
-  /// Ellipsoids stay near those of the start where nothing is gained by moving them, and few of them
-  /// are replaced by seeds: a fifth of the usual number. The frames of a sequence then differ little.
-  bool keepsStart = false;
 };
-
-/// Stands for no ellipsoid of FitOptions::start.
-inline constexpr std::uint32_t kNoStart = 0xffffffffu;
 
 enum class FitEnd { kScheduleDone, kPsnrReached, kTimeUp, kCancelled, kPsnrMissed };
 
 struct FitResult {
   Field field;
   ValueRange range{};  ///< range of the volume's values, to which sums are clamped
-  /// For each ellipsoid of a field with one chunk: the index of the ellipsoid of FitOptions::start,
-  /// counted over its chunks, that it was at the beginning, or kNoStart. The indices increase. Empty
-  /// if the fit began with seeds, and after a fit in chunks.
-  std::vector<std::uint32_t> startOf{};
   std::vector<TimedCurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
   bool kappaLearned = false;  ///< true if kappa was fitted, false if it was given

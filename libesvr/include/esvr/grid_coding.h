@@ -23,8 +23,6 @@ struct ActivityOptions {
   Activity activity = Activity::kAuto;
   /// The simplified masks of the source, if they are kept; null: one is made if needed.
   const SimplifiedMasks* simplified = nullptr;
-  /// The grid of the previous frame, whose thresholds are kept where it matters little; null: none.
-  const StoredGrid* previous = nullptr;
 };
 
 /// Makes a stored grid from a fitted field and the properties of its source. It chooses the rule by

@@ -64,12 +64,6 @@ struct QuantisedEllipsoids {
   /// End index of each importance layer, increasing; the last one is size(). Empty: there is one
   /// layer only.
   std::vector<std::size_t> layerEnds;
-  /// Of the frame of a sequence: for each of the first ellipsoids, the index of the ellipsoid of the
-  /// previous frame that it continues, increasing. The ellipsoids after them are new, and there are
-  /// no layers. Empty if no ellipsoid continues another one.
-  std::vector<std::uint32_t> continues{};
-  /// The motion of each of these ellipsoids since the previous frame, in 1/256 of a cell.
-  std::array<std::vector<std::int32_t>, 3> motion{};
 
   [[nodiscard]] std::size_t size() const { return precision.size(); }
   void resize(std::size_t n);
@@ -105,9 +99,6 @@ struct LatticeChoice {
 /// \throws RuntimeFailure  a value lies outside the lattice
 [[nodiscard]] QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
                                            std::vector<std::size_t>& order);
-
-/// The same ellipsoids as those of a file without frames: in the order of the file, in one layer.
-[[nodiscard]] QuantisedEllipsoids standingAlone(QuantisedEllipsoids q);
 
 /// Replaces the intensities by new ones, rounded to the existing quantisation lattice.
 /// \param intensities  one for each ellipsoid, in the file's order

@@ -32,7 +32,6 @@ FitResult fitOn(const Device& device, const SparseVolume& volume) {
 struct StepCase {
   std::string name;
   double voxelShare;
-  bool fromStart;  ///< whether a penalty keeps the ellipsoids near a start
 };
 class StepOnGpu : public test::CudaTest, public testing::WithParamInterface<StepCase> {};
 
@@ -41,16 +40,9 @@ TEST_P(StepOnGpu, IsThatOfTheCpu) {
   FitTarget target = makeTarget(volume, std::nullopt);
   target.voxelShare = GetParam().voxelShare;
   const auto begin = test::randomEllipsoids(50, 1.0, 3.0);
-  const auto starts = test::randomEllipsoids(50, 1.1, 2.9);
   FitState state = stateOf(begin);
-  OptimiserOptions options;
-  Tuning tuning;
-  tuning.startPenalty = 100.0;  // large, so that the step is mostly that of the penalty
-  if (GetParam().fromStart) {
-    options.starts = starts;
-    for (std::uint32_t i = 0; i < begin.size(); i += 2) state.adam[i].start = i;
-  }
-  CudaOptimiser onGpu(target, options, tuning);
+  const Tuning tuning;
+  CudaOptimiser onGpu(target, {}, tuning);
   onGpu.setState(state);
   onGpu.iterate(std::array{0.5});
 
@@ -65,8 +57,7 @@ TEST_P(StepOnGpu, IsThatOfTheCpu) {
             .options = tuning.adam,
             .limits = {tuning.smallestScale, tuning.largestScale,
                        tuning.intensityHeadroom * target.lowest,
-                       tuning.intensityHeadroom * target.highest},
-            .penalty = {starts.data(), GetParam().fromStart ? tuning.startPenalty : 0.0}});
+                       tuning.intensityHeadroom * target.highest}});
   const auto found = onGpu.ellipsoids();
   // Adam's first step has the given size and the sign of the gradient. A component can differ only
   // if its gradient is lost in rounding, and then by twice the step.
@@ -77,9 +68,7 @@ TEST_P(StepOnGpu, IsThatOfTheCpu) {
   EXPECT_LE(differing, 2);
 }
 INSTANTIATE_TEST_SUITE_P(Steps, StepOnGpu,
-                         testing::Values(StepCase{"AtVoxels", 1.0, false},
-                                         StepCase{"BetweenVoxels", 0.0, false},
-                                         StepCase{"FromAStart", 1.0, true}),
+                         testing::Values(StepCase{"AtVoxels", 1.0}, StepCase{"BetweenVoxels", 0.0}),
                          [](const auto& step) { return step.param.name; });
 
 // The rule of motion_bound.h decides when lists are built again, and not the number of steps that
