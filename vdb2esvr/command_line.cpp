@@ -118,8 +118,7 @@ void addGoalOptions(cli::po::options_description& options) {
      "values than the background are carried unchanged")
     ("max-error", value<std::string>()->value_name("E"),
      "keep the error of every voxel within E, or within E% of the range of the active values (of vectors: of the component with the largest range); NAME=E is the "
-     "bound of one grid, as with --psnr; if ellipsoids are stored, they have a residual; a sample of "
-     "the grid shows whether they may be smaller")
+     "bound of one grid, as with --psnr; voxels are stored")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("topology", value<std::string>()->value_name("T")->default_value("auto"),

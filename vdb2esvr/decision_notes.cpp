@@ -48,22 +48,6 @@ const char* whyPlateau(const Conversion& conversion) {
   return "no lattice of voxels was chosen for the goal";
 }
 
-/// True if the bytes of ellipsoids were estimated and not measured.
-bool isEstimated(const Conversion& conversion) {
-  const auto& choice = conversion.choice;
-  return choice && choice->ellipsoids && choice->ellipsoids->estimated;
-}
-
-const char* whyResidual(const Conversion& conversion) {
-  const Decision& residual = conversion.decisions.residual;
-  if (residual.used) return "it corrects the ellipsoids to within the bound";
-  if (residual.bytesWith) return "voxels take fewer bytes than ellipsoids with a residual";
-  if (residual.tried && isEstimated(conversion))
-    return "a sample of bricks shows that voxels take fewer bytes than ellipsoids with a residual";
-  if (residual.tried) return "no ellipsoids with a residual were found that keep the bound";
-  return "ellipsoids within a bound were not considered";
-}
-
 const Candidate& storedOf(const ChoiceRecord& choice, bool voxels) {
   return voxels ? *choice.voxels : *choice.ellipsoids;
 }
@@ -98,7 +82,6 @@ LeftOut representationNote(const Conversion& conversion) {
 std::vector<LeftOut> decisionNotes(const Conversion& conversion) {
   const DecisionRecord& decisions = conversion.decisions;
   return {clampNote(conversion), note("plateau", whyPlateau(conversion), decisions.plateau),
-          note("residual", whyResidual(conversion), decisions.residual),
           representationNote(conversion)};
 }
 

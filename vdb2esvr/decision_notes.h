@@ -1,6 +1,6 @@
 #pragma once
-/// Lists what a conversion decided about four means of making a grid smaller, also where the file
-/// has them: the clamp, the plateau, the residual and the choice of the representation.
+/// Lists what a conversion decided about three means of making a grid smaller, also where the file
+/// has them: the clamp, the plateau and the choice of the representation.
 
 #include <vector>
 

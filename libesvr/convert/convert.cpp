@@ -1,12 +1,13 @@
 #include "esvr/convert.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "convert/attempt.h"
-#include "convert/bounded.h"
 #include "convert/choice.h"
 #include "convert/exact_voxels.h"
 #include "convert/narrow_band.h"
@@ -24,6 +25,17 @@ namespace esvr {
 namespace {
 
 using convert::Job;
+
+double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
+  return goal.relative ? goal.bound * valueRangeOf(source) : goal.bound;
+}
+
+/// The largest absolute error that a goal allows; nothing for a goal without a bound.
+std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
+  if (std::holds_alternative<LosslessGoal>(goal)) return 0.0;
+  if (const auto* within = std::get_if<BoundGoal>(&goal)) return absoluteBound(*within, source);
+  return std::nullopt;
+}
 
 /// Stores a fit in the form that the options determine.
 Conversion stored(const Job& job, FitResult fit, const CommonFitOptions& options) {
@@ -64,10 +76,30 @@ class Converter {
   Conversion operator()(const PsnrGoal& goal) const {
     return convert::convertToPsnr(job_, {goal.psnr});
   }
-  Conversion operator()(const BoundGoal& goal) const { return convert::convertWithin(job_, goal); }
-  Conversion operator()(const LosslessGoal&) const { return convert::convertLossless(job_); }
+  Conversion operator()(const BoundGoal& goal) const {
+    const SparseVolume& source = job_.input.source;
+    const double bound = absoluteBound(goal, source);
+    return asVoxels(bound == 0.0 ? exactLayer(source)
+                                 : boundedLayer(source, bound, convert::voxelActivity(job_),
+                                                convert::voxelSigns(job_), job_.input.simplified,
+                                                convert::decodedValues(job_)));
+  }
+  Conversion operator()(const LosslessGoal&) const {
+    if (job_.input.descriptor.valueType == ValueType::kDouble)
+      throw UsageError(
+          "grid '" + shownName(job_.input.descriptor.name) +
+          "' has values of type double, which are read as float32; a lossless grid cannot hold "
+          "them; choose a bound or a PSNR instead");
+    return asVoxels(exactLayer(job_.input.source));
+  }
 
  private:
+  [[nodiscard]] Conversion asVoxels(VoxelLayer layer) const {
+    Conversion conversion;
+    conversion.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(layer));
+    return conversion;
+  }
+
   Job job_;
 };
 
@@ -99,7 +131,7 @@ void requireBound(const ConvertInput& input, const SparseVolume& decoded, double
 /// Checks the decoded grid against all that it promises.
 void requirePromises(const Job& job, const StoredGrid& grid) {
   const SparseVolume& source = job.input.source;
-  const auto bound = convert::boundOf(job.options.goal, source);
+  const auto bound = boundOf(job.options.goal, source);
   if (!bound && !job.options.fit.narrowBand) return;
   const BestSoFar completion;  // no grid is returned that was not checked
   const SparseVolume decoded = decodeGrid(grid, {.memory = memoryOf(source)});
@@ -115,6 +147,12 @@ void requirePossible(const ConvertOptions& options) {
     throw UsageError("float32 storage is a form of ellipsoids; it excludes voxels");
   if (wanted == Representation::kVoxels && options.fit.fitFor == FitFor::kDrawing)
     throw UsageError("a fit for drawing needs ellipsoids; it excludes voxels");
+  const bool wantsEllipsoids =
+      wanted == Representation::kEllipsoids || options.storage.form == Storage::kFloat32;
+  if (wantsEllipsoids && std::holds_alternative<BoundGoal>(options.goal))
+    throw UsageError(
+        "ellipsoids do not bound the error of every voxel; store voxels, or choose a PSNR or a "
+        "size");
   if (wanted == Representation::kEllipsoids && std::holds_alternative<LosslessGoal>(options.goal))
     throw UsageError("ellipsoids are not lossless");
 }
@@ -153,8 +191,7 @@ std::optional<std::uint64_t> smallerExactBytes(const Job& job, const StoredGrid&
 /// bytes, so that no fit is made for comparison.
 bool keepsVoxels(const ConvertOptions& options) {
   const bool hasQuality = std::holds_alternative<PresetGoal>(options.goal) ||
-                          std::holds_alternative<PsnrGoal>(options.goal) ||
-                          std::holds_alternative<BoundGoal>(options.goal);
+                          std::holds_alternative<PsnrGoal>(options.goal);
   return options.previous && options.previous->voxels && hasQuality &&
          options.representation == Representation::kAuto &&
          options.storage.form == Storage::kCompact && options.fit.fitFor == FitFor::kVoxels;

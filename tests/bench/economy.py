@@ -269,7 +269,7 @@ def decided(measured):
         seconds = f"{entry['seconds']:.2f}" if "seconds" in entry else NOT_MEASURED
         return [scene["name"], part, "yes" if entry["used"] else "no", figure(entry, "bytes_with"),
                 figure(entry, "bytes_without"), seconds]
-    rows = [row(s, p, s["decisions"][p]) for s in measured for p in ["clamp", "residual", "plateau", "representation"]
+    rows = [row(s, p, s["decisions"][p]) for s in measured for p in ["clamp", "plateau", "representation"]
             if p in s["decisions"] and FIGURES & s["decisions"][p].keys()]
     return "## Decisions of the conversion\n\n" + paragraph(
         "What the list `left_out` of the report says of the first grid ([report.md](report.md#what-the-conversion-decided)). "

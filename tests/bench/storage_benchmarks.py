@@ -5,7 +5,6 @@
     storage_benchmarks.py layers   --bin BUILD --data DIR --out OUT   the first importance layers
     storage_benchmarks.py targets  --bin BUILD --data DIR --out OUT   files of a given size or PSNR
     storage_benchmarks.py lossless --bin BUILD --data DIR --out OUT   voxels stored exactly
-    storage_benchmarks.py bounds   --bin BUILD --data DIR --out OUT   voxels or a residual within a bound
     storage_benchmarks.py decode   --bin BUILD --data DIR --out OUT   the speed of decoding voxels
 
 Each command prints the rows of a Markdown table. Fits run on two threads of the CPU, or on --device.
@@ -30,11 +29,6 @@ TARGETS = [("aneurism", "--size", "13141"), ("aneurism", "--size", "50KB"),
            ("neuron_m207", "--size", "40KB"), ("neuron_m207", "--size", "200KB"),
            ("dragon_with_xform", "--psnr", "48.3"), ("cube_levelset", "--psnr", "50")]
 LOSSLESS = ["aneurism", "smoke1", "wdas_cloud_sixteenth", "hydrogen_atom", "neuron_m207"]
-BOUNDS = [("smoke1", "0.1%"), ("smoke1", "1%"), ("smoke1", "2%"), ("hydrogen_atom", "5%"),
-          ("hydrogen_atom", "10%"), ("dragon_with_xform", "1%"), ("dragon_with_xform", "2%"),
-          ("wdas_cloud_sixteenth", "2%"), ("wdas_cloud_sixteenth", "10%"), ("aneurism", "1%"),
-          ("aneurism", "10%"), ("neuron_rp140212", "2%"), ("neuron_rp140212", "5%"),
-          ("neuron_m207", "5%")]
 # The forms of voxels whose decoding is timed, and the volume that esvr-sample makes for it.
 DECODED = [("lossless", ["--lossless"]), ("1 %", ["--max-error", "1%"])]
 LARGE = ("plume", "800")
@@ -77,11 +71,6 @@ def about_if_estimated(found):
     return "about " if found["estimated"] else ""
 
 
-def candidate_bytes(found):
-    """The bytes of a representation that was considered."""
-    return f"{about_if_estimated(found)}{found['bytes']:,}" if found else "-"
-
-
 def candidate(found):
     """The bytes and the PSNR of a representation that was considered for a goal."""
     if not found:
@@ -109,15 +98,6 @@ def lossless(arguments):
         source = (arguments.data / f"{name}.vdb").stat().st_size
         print(f"| {name} | {source:,} | {report['output']['bytes']:,} | "
               f"{report['process']['seconds']:.1f} |", flush=True)
-
-
-def bounds(arguments):
-    for name, bound in BOUNDS:
-        report = fitted(arguments, name, "--max-error", bound, representation="auto")
-        found = report["grids"][0]["representation"]
-        tried = candidate_bytes(found["ellipsoids"])
-        print(f"| {name} | {bound} | {found['voxels']['bytes']:,} | {tried} | {found['stored']} | "
-              f"{report['process']['seconds']:.0f} |", flush=True)
 
 
 def large_volume(arguments):
@@ -156,7 +136,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     jobs = {"compact": compact, "layers": layers, "targets": targets, "lossless": lossless,
-            "bounds": bounds, "decode": decode}
+            "decode": decode}
     parser.add_argument("what", choices=jobs)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path, required=True)

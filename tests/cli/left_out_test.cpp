@@ -1,4 +1,4 @@
-// Plan: for each of the four decisions in a report's `left_out`, one run uses the part and one does
+// Plan: for each of the three decisions in a report's `left_out`, one run uses the part and one does
 // not. The figures are those of the file and of the candidates. A decision that a run did not have
 // to make has no figures.
 
@@ -138,42 +138,6 @@ TEST_F(LeftOut, saysWhyThereIsNoPlateau) {
   const Json exact = entryOf(gridOf(noise(), {"--lossless"}), "plateau");
   EXPECT_FALSE(exact["used"]);
   expectNoFigures(exact);
-}
-
-/// The voxels of the cloud take about 1570 bytes, and ellipsoids with a residual about 780 bytes.
-TEST_F(LeftOut, SlowHasTheFiguresOfAResidualAndOfTheOtherRepresentation) {
-  const Json grid =
-      gridOf(test::cloud(40), {"--max-error", "5%", "--kappa", "-6"}, {.iterations = "1000"});
-  const Json& made = grid["representation"];
-  ASSERT_EQ(made["stored"], "ellipsoids and residual");
-  for (const char* part : {"residual", "representation"}) {
-    const Json entry = entryOf(grid, part);
-    EXPECT_TRUE(entry["used"]);
-    EXPECT_EQ(entry["bytes_with"], made["ellipsoids"]["bytes"]);
-    EXPECT_EQ(entry["bytes_without"], made["voxels"]["bytes"]);
-  }
-  EXPECT_GT(entryOf(grid, "residual")["seconds"].get<double>(), 0.0);
-}
-
-/// A sample of the noise shows that ellipsoids with a residual would take more bytes than voxels.
-TEST_F(LeftOut, hasTheSecondsOfAResidualThatASampleRulesOut) {
-  const Json grid = gridOf(noise(), {"--max-error", "5%"});
-  ASSERT_TRUE(grid["representation"]["ellipsoids"]["estimated"]);
-  const Json residual = entryOf(grid, "residual");
-  EXPECT_FALSE(residual["used"]);
-  EXPECT_THAT(residual["why"].get<std::string>(), testing::HasSubstr("sample"));
-  EXPECT_FALSE(residual.contains("bytes_with"));
-  EXPECT_EQ(residual["bytes_without"], grid["representation"]["voxels"]["bytes"]);
-  EXPECT_GT(residual["seconds"].get<double>(), 0.0);
-}
-
-TEST_F(LeftOut, hasNoFiguresOfAResidualThatWasNotTried) {
-  expectNoFigures(entryOf(gridOf(test::softBall({}), {"--count", "30"}), "residual"));
-  const Json grid = gridOf(noise(), {"--max-error", "5%", "--representation", "voxels"});
-  const Json residual = entryOf(grid, "residual");
-  EXPECT_FALSE(residual["used"]);
-  EXPECT_FALSE(residual.contains("seconds"));
-  EXPECT_FALSE(residual.contains("bytes_with"));
 }
 
 TEST_F(LeftOut, hasNoBytesThatWereOnlyEstimated) {

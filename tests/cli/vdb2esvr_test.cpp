@@ -165,51 +165,18 @@ TEST_F(Vdb2Esvr, givesTheSameBytesInEveryRunOnAnyNumberOfThreads) {
   }
 }
 
-/// Converts `voxels` with --max-error 5% and checks the bound and the report.
-/// \return true if ellipsoids and a residual were stored
-bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
-                                  const std::vector<test::InputVoxel>& voxels,
-                                  const std::string& iterations) {
-  test::writeInput(in, {{.voxels = voxels}});
-  const auto run = vdb2esvr(
-      {in, out, "--max-error", "5%", "--kappa", "-6", "--iterations", iterations, "--report", "-"});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  const Json made = Json::parse(run.out)["grids"][0]["representation"];
-  const StoredGrid grid = readEsvr(out).grids[0];
-  EXPECT_NE(grid.voxels.has_value(), grid.residual.has_value());
-  EXPECT_EQ(made["stored"], grid.voxels ? "voxels" : "ellipsoids and residual");
-  if (grid.residual) {
-    EXPECT_LT(made["ellipsoids"]["bytes"].get<int>(), made["voxels"]["bytes"].get<int>());
-    EXPECT_GT(grid.field.ellipsoidCount(), 0u);
-  }
-  const SparseVolume source = readGrid(in, "density").volume;
-  const ValueRange range = activeRange(source);
-  EXPECT_LE(largestDifference(source, decodeGrid(grid)), 0.05 * (double(range.max) - range.min));
-  return grid.residual.has_value();
-}
-
-/// The voxels of the cloud take about 1570 bytes, and ellipsoids with a residual about 780 bytes.
-TEST_F(Vdb2Esvr, SlowTakesEllipsoidsForABoundWhereTheyAreSmaller) {
-  EXPECT_TRUE(storesEllipsoidsWithinABound(in(), out(), test::cloud(40), "1000"));
-}
-
-/// Every voxel of noise needs a correction, whatever the ellipsoids are.
-TEST_F(Vdb2Esvr, takesVoxelsForABoundWhereTheyAreSmaller) {
-  test::Random random(17);
-  std::vector<test::InputVoxel> noise = softBall({});
-  for (auto& voxel : noise) voxel.value = float(random(0.1, 1.0));
-  EXPECT_FALSE(storesEllipsoidsWithinABound(in(), out(), noise, "100"));
-}
-
-TEST_F(Vdb2Esvr, triesNoEllipsoidsForABoundWhereTold) {
+TEST_F(Vdb2Esvr, storesVoxelsForABound) {
   const std::string report = folder_ / "r.json";
-  const auto run = vdb2esvr(
-      {in(), out(), "--max-error", "5%", "--representation", "voxels", "--report", report});
+  const auto run = vdb2esvr({in(), out(), "--max-error", "5%", "--report", report});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const Json made = Json::parse(test::readText(report))["grids"][0]["representation"];
   EXPECT_EQ(made["stored"], "voxels");
   EXPECT_TRUE(made["ellipsoids"].is_null());
   EXPECT_TRUE(readEsvr(out()).grids[0].voxels.has_value());
+  const auto refused =
+      vdb2esvr({in(), out(), "--force", "--max-error", "5%", "--representation", "ellipsoids"});
+  EXPECT_EQ(refused.exitCode, 2);
+  EXPECT_THAT(refused.err, HasSubstr("store voxels"));
 }
 
 }  // namespace

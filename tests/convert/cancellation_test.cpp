@@ -72,7 +72,6 @@ std::vector<Wanted> goals() {
           {"psnr", PsnrGoal{32.0}},
           {"psnr of ellipsoids", PsnrGoal{30.0}, Representation::kEllipsoids},
           {"bound", BoundGoal{.bound = 0.02}},
-          {"bound of ellipsoids", BoundGoal{.bound = 0.05}, Representation::kEllipsoids},
           {"lossless", LosslessGoal{}},
           {"fit", FitGoal{}},
           {"band", PresetGoal{}, Representation::kAuto, true}};
@@ -219,7 +218,6 @@ TEST(Cancellation, SlowEndsEveryPhaseOfALargeConversionWithinTwoSeconds) {
       {"rate control", [&](auto&) { (void)compactGrid(grid, volume); }},
       {"rate control for a size",
        [&](auto&) { (void)compactGrid(grid, volume, {.bytes = 20'000}); }},
-      {"a residual", [&](auto&) { (void)withResidual(grid, volume, 0.5); }},
       {"evaluating", [&](auto&) { (void)decodeGrid(grid); }},
       {"measuring", [&](auto&) { (void)compareVolumes(volume, decoded, {.ssim = true}); }},
       {"writing",

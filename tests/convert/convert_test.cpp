@@ -140,43 +140,24 @@ TEST(ConvertToPsnr, SaysSoWhereItIsOutOfReach) {
   EXPECT_EQ(convertVolume({kDescriptor, volume}, options).fit.end, FitEnd::kPsnrMissed);
 }
 
-TEST(ConvertWithin, SlowTakesEllipsoidsWhereTheyAreSmallerThanVoxels) {
+TEST(ConvertWithin, StoresVoxels) {
   const double bound = 0.1;
+  for (const SparseVolume& volume : {test::smoothVolume(), test::noiseVolume(2)}) {
+    const Conversion conversion = converted(volume, BoundGoal{bound}, Representation::kAuto);
+    EXPECT_TRUE(conversion.grid.voxels);
+    const double error = largestDifference(volume, decodeGrid(conversion.grid));
+    EXPECT_LE(error, bound);
+    EXPECT_GT(error, 0.5 * bound);
+  }
+}
+
+TEST(ConvertWithin, RefusesEllipsoids) {
   const SparseVolume volume = test::smoothVolume();
-  ConvertOptions options = optionsFor(BoundGoal{bound});
+  EXPECT_THROW((void)converted(volume, BoundGoal{0.1}, Representation::kEllipsoids), UsageError);
+  ConvertOptions options = optionsFor(BoundGoal{0.1});
   options.representation = Representation::kAuto;
-  options.fit.iterations = 200;
-  options.fit.kappa = 0.0f;
-  const Conversion conversion = convertVolume({kDescriptor, volume}, options);
-  ASSERT_TRUE(conversion.choice);
-  ASSERT_TRUE(conversion.grid.residual);
-  EXPECT_EQ(bytesAdded(conversion.grid), conversion.choice->ellipsoids->bytes);
-  EXPECT_LT(conversion.choice->ellipsoids->bytes, conversion.choice->voxels->bytes);
-  EXPECT_LE(largestDifference(volume, decodeGrid(conversion.grid)), bound);
-}
-
-TEST(ConvertWithin, TakesVoxelsOfNoise) {
-  const double bound = 0.1;
-  const SparseVolume volume = test::noiseVolume(2);
-  const Conversion conversion = converted(volume, BoundGoal{bound}, Representation::kAuto);
-  ASSERT_TRUE(conversion.choice);
-  EXPECT_TRUE(conversion.grid.voxels);
-  EXPECT_EQ(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
-  const Decision& residual = conversion.decisions.residual;
-  EXPECT_TRUE(residual.tried);
-  EXPECT_FALSE(residual.used);
-  EXPECT_EQ(residual.bytesWithout, bytesAdded(conversion.grid));
-  EXPECT_TRUE(conversion.choice->ellipsoids->estimated) << "a sample shows that voxels are right";
-  EXPECT_FALSE(residual.bytesWith);
-  EXPECT_LE(largestDifference(volume, decodeGrid(conversion.grid)), bound);
-}
-
-TEST(ConvertWithin, TriesNoEllipsoidsWhereVoxelsAloneAreAskedFor) {
-  const SparseVolume volume = test::smoothVolume();
-  const Conversion conversion = converted(volume, BoundGoal{0.1}, Representation::kVoxels);
-  EXPECT_TRUE(conversion.grid.voxels);
-  EXPECT_FALSE(conversion.choice->ellipsoids);
-  EXPECT_FALSE(conversion.decisions.residual.tried);
+  options.storage.form = Storage::kFloat32;
+  EXPECT_THROW((void)convertVolume({kDescriptor, volume}, options), UsageError);
 }
 
 TEST(ConvertWithin, TakesAShareOfTheRange) {

@@ -48,8 +48,7 @@ struct PsnrGoal {
   double psnr = 0.0;  ///< dB
 };
 
-/// A grid that restores every voxel within a bound. The grid holds voxels, or ellipsoids with a
-/// residual if these take fewer bytes. FitOptions::count, psnr and seconds are ignored.
+/// A grid of voxels that restores every voxel within a bound.
 struct BoundGoal {
   double bound = 0.0;  ///< largest absolute error, 0 or above
   /// `bound` is a share of valueRangeOf() of the volume (metrics.h). The components of a vector have
@@ -65,17 +64,15 @@ using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, Lo
 /// PSNR over the active voxels that a preset stands for, dB.
 [[nodiscard]] double presetPsnr(Preset preset);
 
-/// What a stored grid consists of. A LosslessGoal always stores voxels.
+/// What a stored grid consists of. A BoundGoal and a LosslessGoal always store voxels.
 enum class Representation {
   /// Ellipsoids or voxels: those with the higher PSNR for a SizeGoal, and those that take fewer
-  /// bytes for a PsnrGoal or a BoundGoal. A FitGoal stores ellipsoids unless exact voxels take no
+  /// bytes for a PsnrGoal. A FitGoal stores ellipsoids unless exact voxels take no
   /// more bytes. If the bricks of the volume have more than 2^25 voxels, goals other than a
   /// BoundGoal store either exact voxels or ellipsoids. Coding voxels takes long then, so that it
   /// is done only if an estimate from a sample says that they may be small enough.
   kAuto,
-  /// Ellipsoids. For a BoundGoal they have a residual, which a narrow band has only together with
-  /// Activity::kExact. For the other goals, those of a narrow band have one where the sign of a voxel
-  /// would be wrong.
+  /// Ellipsoids. Those of a narrow band have a residual where the sign of a voxel would be wrong.
   kEllipsoids,
   kVoxels
 };
@@ -107,8 +104,8 @@ struct ConvertOptions {
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
   /// Another grid that this one refers to in its file may take its place (voxel_reference.h).
-  /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal, a PsnrGoal and a
-  /// BoundGoal, so that only the first frame of a group takes the time of a fit.
+  /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal and a PsnrGoal, so that
+  /// only the first frame of a group takes the time of a fit.
   const StoredGrid* previous = nullptr;
   /// Weight of the error of the change since the previous frame, from 0 (least bytes) to 1 (least
   /// flicker), if there is one. Voxels then keep a part of the errors of the previous frame.
@@ -141,7 +138,7 @@ struct CompactRecord {
 /// A grid that was considered for a goal.
 struct Candidate {
   std::uint64_t bytes = 0;  ///< bytesAdded
-  /// PSNR over the box, dB; +inf for exact voxels. Nothing for a BoundGoal.
+  /// PSNR over the box, dB; +inf for exact voxels. Nothing if it was not measured.
   std::optional<double> psnr{};
   /// The figures were extrapolated from a short fit, from a sample, or from the first bricks of
   /// voxels that are too large.
@@ -174,7 +171,6 @@ struct DecisionRecord {
   Decision bothSigns;
   /// A quantisation lattice of voxels that contains the most frequent value, the plateau.
   Decision plateau;
-  Decision residual;  ///< ellipsoids with a residual instead of voxels, for a BoundGoal
 };
 
 struct Conversion {
@@ -192,8 +188,7 @@ struct Conversion {
 /// the best fit found is returned with FitEnd::kPsnrMissed.
 /// \throws UsageError  the grid does not fit into the size; the source of a LosslessGoal has
 ///                     doubles; a SizeGoal is combined with kFloat32; the goal and the
-///                     representation exclude each other; kEllipsoids is requested for a BoundGoal
-///                     that ellipsoids with a residual cannot reach; a SizeGoal is too small for
+///                     representation or the storage exclude each other; a SizeGoal is too small for
 ///                     the ellipsoids of a narrow band and the residual of their signs
 /// A volume whose background is far from its values (spanOf, sparse_volume.h) is converted relative
 /// to a value among them, with its exact mask whatever StorageOptions::activity says, unless the goal
