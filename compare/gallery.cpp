@@ -114,14 +114,12 @@ Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, c
   referenceCost_ = clock.cost();
 }
 
-Gallery::Compared Gallery::compare(Renderer& renderer, Between between) const {
+Gallery::Compared Gallery::compare(Renderer& renderer) const {
   Clock clock(renderer, device_);
   Sums sums;
   Compared result;
   for (std::size_t i = 0; i < views_.size(); ++i) {
-    RenderOptions view = views_[i];
-    view.between = between;
-    const Image image = clock.draw(view);
+    const Image image = clock.draw(views_[i]);
     sums.add(references_[i], image, lpips_);
     if (i == 0) result.shown = {report::toPng(image), errorPng(references_[i], image)};
   }

@@ -54,8 +54,7 @@ class Gallery {
     Shown shown;
   };
   /// The exceptions are those of Renderer::draw and PictureMetric.
-  /// \param between  used if the renderer draws a field
-  [[nodiscard]] Compared compare(Renderer& renderer, Between between) const;
+  [[nodiscard]] Compared compare(Renderer& renderer) const;
   [[nodiscard]] const std::string& referencePng() const { return referencePng_; }
   /// The cost of drawing the reference; only fps and deviceBytes are set.
   [[nodiscard]] const ImageFigures& referenceCost() const { return referenceCost_; }

@@ -158,8 +158,8 @@ VolumeMetrics RowMaker::compare(const SparseVolume& volume) const {
                         {.box = scene_.box, .peak = scene_.peak, .ssim = true});
 }
 
-void RowMaker::measurePictures(Renderer& renderer, TableRow& row, Between between) const {
-  auto compared = scene_.gallery->compare(renderer, between);
+void RowMaker::measurePictures(Renderer& renderer, TableRow& row) const {
+  auto compared = scene_.gallery->compare(renderer);
   row.images = compared.figures;
   row.shown = std::move(compared.shown);
   row.fps = compared.figures.fps;
@@ -323,8 +323,7 @@ void RowMaker::drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, Tabl
   const Device& device = scene_.gallery->device();
   if (!followsFromEllipsoids(grid))
     return measurePictures(*makeVolumeRenderer(voxels, device), row);
-  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), row,
-                  fittedBetween(grid.field));
+  measurePictures(*makeFieldRenderer(grid.field, device, {}, voxelRule(grid)), row);
 }
 
 TableRow RowMaker::candidate(const std::filesystem::path& path) {

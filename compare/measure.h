@@ -64,7 +64,7 @@ class RowMaker {
   [[nodiscard]] VolumeMetrics compare(const SparseVolume& volume) const;
   /// Measures the voxels and, if wanted, their pictures.
   void measureVoxels(const SparseVolume& volume, NanoValues values, TableRow& row) const;
-  void measurePictures(Renderer& renderer, TableRow& row, Between between = Between::kVoxels) const;
+  void measurePictures(Renderer& renderer, TableRow& row) const;
   void drawEsvr(const StoredGrid& grid, const SparseVolume& voxels, TableRow& row) const;
   [[nodiscard]] std::string command(const std::string& arguments) const;
 

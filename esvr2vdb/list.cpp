@@ -40,11 +40,6 @@ struct Listing {
   }
 };
 
-const char* purposeOf(const Field& field, std::uint64_t ellipsoids) {
-  if (ellipsoids == 0) return "-";
-  return field.fitFor == FitFor::kDrawing ? "drawing" : "voxels";
-}
-
 /// The grids and the components of vectors.
 std::vector<ListedGrid> withComponents(const EsvrFile& file, const std::vector<ListedGrid>& grids) {
   const GridNames names(namesInOrder(file));
@@ -99,7 +94,6 @@ std::vector<std::string> rowOfStored(const Listing& listing, const ListedGrid& n
           cli::nameOf(grid.descriptor.valueType),
           std::to_string(grid.activeVoxels),
           std::to_string(ellipsoids),
-          purposeOf(grid.field, ellipsoids),
           textOf(grid.field.kernel),
           cli::nameOf(grid.topology),
           std::to_string(cli::ownBytes(listing.summary, named.grid.index)),
@@ -129,8 +123,8 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const ListedGrid& 
 }
 
 void printGrids(const Listing& listing) {
-  cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "fitted for",
-                    "kernel, kappa", "active by", "bytes", "bytes each"});
+  cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "kernel, kappa",
+                    "active by", "bytes", "bytes each"});
   std::size_t place = listing.grids.size();
   for (const ListedGrid& part : listing.parts) {
     const ListedGrid& grid = listing.grids[part.place];

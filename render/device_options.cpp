@@ -45,10 +45,9 @@ void addDeviceOptions(cli::po::options_description& options) {
     ("depth-parts", value<int>()->value_name("N"),
      "with --between sum: number of parts, 1 to 16, into which a GPU divides the depth of the scene "
      "to draw them in parallel (default: chosen from the first picture)")
-    ("between", value<std::string>()->value_name("B")->default_value("auto"),
+    ("between", value<std::string>()->value_name("B")->default_value("voxels"),
      "voxels: between voxels, interpolate the decoded voxels; sum: evaluate the sum of ellipsoids "
-     "itself, which is faster where a pixel covers many voxels, but less accurate unless the file "
-     "was made with --fit-for drawing; auto: sum for such a file, otherwise voxels")
+     "itself, which is faster where a pixel covers many voxels, but less accurate")
     ("values", value<std::string>()->value_name("T"),
      "draw voxels from a NanoVDB grid of this type: float, fp4, fp8, fp16 or fpn");
   // clang-format on
@@ -58,9 +57,8 @@ void readDeviceOptions(const Arguments& a, Options& options) {
   options.device = cli::deviceOf(a);
   options.limits = limitsOf(a);
   options.values = valuesOf(a);
-  options.between = cli::choose<std::optional<Between>>(
-      "between", a.get<std::string>("between"),
-      {{"auto", std::nullopt}, {"voxels", Between::kVoxels}, {"sum", Between::kSum}});
+  options.between = cli::choose<Between>("between", a.get<std::string>("between"),
+                                         {{"voxels", Between::kVoxels}, {"sum", Between::kSum}});
   if (options.shading && options.values)
     throw UsageError("--shade cannot be drawn from a NanoVDB grid; leave --values out");
 }

@@ -56,7 +56,7 @@ struct Options {
   std::optional<Rgb> background;           ///< default: the picture is transparent
   bool legend = false;                     ///< draw a color bar
   int bits = 8;                            ///< bits of a PNG's channel
-  std::optional<Between> between;          ///< default: what the ellipsoids were fitted for
+  Between between = Between::kVoxels;
   RenderMode mode = RenderMode::kComposite;
   Classification classification = Classification::kPreIntegrated;
   LevelOfDetail lod = LevelOfDetail::kAuto;

@@ -32,12 +32,6 @@ TransferFunction transferOf(const Options& options, const Scene& scene) {
   return transferOf(options.look, scene, options.mode, kUsualColors);
 }
 
-/// The rule between voxels unless --between was given.
-Between usualBetween(const Scene& scene) {
-  const auto* field = std::get_if<Field>(&scene.content);
-  return field ? fittedBetween(*field) : Between::kVoxels;
-}
-
 /// Benchmarks use the sphere around the volume, so that their figures are those of earlier versions.
 Framing framingOf(const Options& options) {
   if (options.bench) return Framing::kSphere;
@@ -105,7 +99,7 @@ RenderOptions renderOptions(const Options& options, const std::vector<Scene>& sc
   r.classification = options.classification;
   r.lod = options.lod;
   r.shading = options.shading;
-  r.between = options.between.value_or(usualBetween(scene));
+  r.between = options.between;
   r.clip = options.clip;
   return r;
 }

@@ -126,7 +126,7 @@ bool liesFarApart(const Scene& scene) {
   constexpr double kMostBlocks = double(1 << 26);  // 256 MB
   constexpr double kBlockSide = 64.0;
   const auto* const field = std::get_if<Field>(&scene.content);
-  if (field == nullptr || !scene.encoded || fittedBetween(*field) == Between::kSum) return false;
+  if (field == nullptr || !scene.encoded) return false;
   const auto blocks = [](std::int32_t low, std::int32_t high) {
     return (double(high) - double(low)) / kBlockSide + 2.0;
   };
@@ -257,9 +257,7 @@ std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame, const SceneFil
 
 Scene outlineOf(const StoredGrid& grid, const std::string& name) {
   Scene scene = propertiesOf(grid, name);
-  Field field;  // its ellipsoids are not drawn
-  field.fitFor = grid.field.fitFor;
-  scene.content = std::move(field);
+  scene.content = Field{};  // its ellipsoids are not drawn
   return scene;
 }
 

@@ -92,8 +92,6 @@ Json askedJson(const Options& options) {
           {"iterations", orNull(fit.iterations)},
           {"method", options.paper ? "paper" : "default"},
           {"preset", nameOf(fit.preset)},
-          {"fit_for", fit.fitFor == FitFor::kDrawing ? "drawing" : "voxels"},
-          {"voxel_share", fit.fitFor == FitFor::kDrawing ? Json(fit.voxelShare) : Json(nullptr)},
           {"kappa", orNull(fit.kappa)},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
           {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},

@@ -138,14 +138,6 @@ void addFitOptions(cli::po::options_description& options) {
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
      "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
      "over the active voxels; in a single fit, the count and the iterations that are not given")
-    ("fit-for", value<std::string>()->value_name("F")->default_value("voxels"),
-     "voxels: fit the voxels; drawing: fit the values between voxels too, so that esvr-render can "
-     "draw the sum of ellipsoids itself; the error at the voxels is then larger; level sets are "
-     "always fitted for their voxels")
-    ("voxel-share", value<double>()->value_name("S")
-         ->default_value(FitOptions{}.voxelShare, cli::shortNumber(FitOptions{}.voxelShare)),
-     "with --fit-for drawing: share of the iterations, 0 to 1, that compare at the voxels; the "
-     "others compare between them")
     ("kappa", value<float>()->value_name("K"),
      "edge of the kernel (default: it is fitted with the ellipsoids)")
     ("box", value<std::string>()->value_name("BOX"),

@@ -9,7 +9,6 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "esvr/psnr_between.h"
 #include "vdb2esvr/source.h"
 
 namespace esvr::vdb2esvr {
@@ -67,17 +66,6 @@ void countHits(const SparseVolume& source, ConvertedGrid& grid) {
   grid.voxelPairs = esvr::countHits(grid.stored().field, corners).voxelPairs;
 }
 
-/// The error of the sum between voxels, where it is meant to be drawn.
-std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid& grid,
-                                   const CommonFitOptions& fit) {
-  const bool isDrawn = grid.field.fitFor == FitFor::kDrawing && !grid.farBackground;
-  if (!isDrawn || grid.field.ellipsoidCount() == 0) return std::nullopt;
-  const RevoxeliseOptions rule = voxelRule(grid);
-  return psnrBetween(
-      source, grid.field,
-      {.box = fit.box, .range = rule.range, .narrowBand = rule.narrowBand, .peak = fit.peak});
-}
-
 /// Largest number of voxels in bricks up to which the meshes of a level set are compared without
 /// being asked for. Comparing them takes about 2 s per million of these voxels.
 constexpr std::size_t kMaxMeshedVoxels = std::size_t{1} << 19;
@@ -113,7 +101,6 @@ void measureAll(const Options& options, const VolumeGrid& source, ConvertedGrid&
   grid.surface = surfaceErrors(source, decoded);
   if (source.descriptor.gridClass == GridClass::kLevelSet)
     grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
-  grid.psnrBetween = errorBetween(source.volume, grid.stored(), options.convert.fit);
   if (options.countHits) countHits(source.volume, grid);
 }
 

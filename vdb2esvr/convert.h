@@ -42,7 +42,6 @@ struct ConvertedGrid {
   std::optional<double> wantedPsnr;      ///< PSNR over the box that the grid should reach, dB
   std::optional<SurfaceErrors> surface;  ///< of a narrow band
   std::string whyNoNarrowBand;           ///< of a level set that is none (whyNoNarrowBand())
-  std::optional<double> psnrBetween;     ///< of ellipsoids that were fitted for drawing, dB
   std::size_t bricks = 0;                ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
   InactiveValues inactive;                  ///< of the source, which the file does not hold

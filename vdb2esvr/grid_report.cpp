@@ -209,19 +209,18 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
           {"stability", stabilityOf(grid.stored())},
-          {"metrics", metricsJson(grid.metrics, grid.psnrBetween)},
+          {"metrics", metricsJson(grid.metrics)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsJson(grid.seconds)},
           {"left_out", leftOutJson(leftOut(record, g))},
           {"curve", curveOf(grid.conversion.fit.curve)}};
 }
 
-Json metricsJson(const VolumeMetrics& m, const std::optional<double>& between) {
+Json metricsJson(const VolumeMetrics& m) {
   return {{"peak", m.peak},
           {"box_voxels", m.boxVoxels},
           {"psnr_box", m.psnrBox},
           {"psnr_active", m.psnrActive},
-          {"psnr_between", orNull(between)},
           {"max_error", m.maxError},
           {"max_error_at", {m.maxErrorAt.x, m.maxErrorAt.y, m.maxErrorAt.z}},
           {"p999_error", m.p999Error},

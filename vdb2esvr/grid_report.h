@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
-#include <optional>
 
 #include "esvr/metrics.h"
 #include "vdb2esvr/run_record.h"
@@ -13,9 +12,7 @@ namespace esvr::vdb2esvr {
 /// \param g  index of the grid in the record
 [[nodiscard]] nlohmann::ordered_json gridJson(const RunRecord& record, std::size_t g);
 
-/// \param between  PSNR between voxels
-[[nodiscard]] nlohmann::ordered_json metricsJson(const VolumeMetrics& metrics,
-                                                 const std::optional<double>& between);
+[[nodiscard]] nlohmann::ordered_json metricsJson(const VolumeMetrics& metrics);
 
 [[nodiscard]] nlohmann::ordered_json secondsJson(const PhaseSeconds& seconds);
 

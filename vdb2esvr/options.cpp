@@ -52,11 +52,6 @@ FitOptions fitOptions(const Arguments& a) {
   fit.preset = cli::choose<Preset>(
       "preset", a.get<std::string>("preset"),
       {{"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}});
-  fit.fitFor = cli::choose<FitFor>("fit-for", a.get<std::string>("fit-for"),
-                                   {{"voxels", FitFor::kVoxels}, {"drawing", FitFor::kDrawing}});
-  fit.voxelShare = *bounded<double>(a, "voxel-share", 0.0, 1.0);
-  if (!a.values["voxel-share"].defaulted() && fit.fitFor != FitFor::kDrawing)
-    throw UsageError("--voxel-share needs --fit-for drawing");
   if (const auto memory = a.find<std::string>("max-vram"))
     fit.maxDeviceBytes = std::size_t(cli::parseDeviceMemory("max-vram", *memory));
   fit.chunkVoxels = bounded<std::uint64_t>(a, "chunk-voxels", std::int64_t{1},
@@ -142,7 +137,7 @@ void readSize(const Arguments& a, Options& options) {
 void readPaper(const Arguments& a, Options& options) {
   const auto given = a.find<std::vector<std::string>>("paper");
   if (!given) return;
-  refuseWith(a, "paper", {"kappa", "iterations", "preset", "fit-for", "chunk-voxels"});
+  refuseWith(a, "paper", {"kappa", "iterations", "preset", "chunk-voxels"});
   options.paper = readPaperMethod(*given);
   options.paper->countHits = a.get<bool>("hits");
   StorageOptions& storage = options.convert.storage;
@@ -157,11 +152,6 @@ void readPaper(const Arguments& a, Options& options) {
 void requireRepresentation(const Arguments& a, const Options& options) {
   const Representation wanted = options.convert.representation;
   const bool sized = options.size || options.ratio;
-  const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
-  if (forDrawing && wanted == Representation::kVoxels)
-    throw UsageError("--fit-for drawing cannot be combined with --representation voxels");
-  if (forDrawing && a.get<bool>("lossless"))
-    throw UsageError("--fit-for drawing cannot be combined with --lossless");
   if (wanted == Representation::kEllipsoids && a.get<bool>("lossless"))
     throw UsageError("--representation ellipsoids cannot be combined with --lossless");
   if (wanted != Representation::kVoxels) return;

@@ -28,13 +28,12 @@ Json toJson(const RunRecord& record, const ConvertedVector& vector) {
   Json components = Json::array();
   for (std::size_t c = 0; c < kComponents; ++c) {
     components.push_back({{"name", record.grids[vector.stored.first + c].uniqueName}});
-    if (vector.metrics)
-      components.back()["metrics"] = metricsJson(vector.metrics->components[c], std::nullopt);
+    if (vector.metrics) components.back()["metrics"] = metricsJson(vector.metrics->components[c]);
   }
   Json json{{"name", vector.uniqueName},
             {"value_type", vector.valueType},
             {"bytes", ownBytes(record.output, vector)}};
-  if (vector.metrics) json["metrics"] = metricsJson(vector.metrics->magnitude, std::nullopt);
+  if (vector.metrics) json["metrics"] = metricsJson(vector.metrics->magnitude);
   json["components"] = std::move(components);
   return json;
 }

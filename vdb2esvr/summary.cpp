@@ -91,16 +91,8 @@ void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostr
 }
 
 /// Says how the data of a grid were made.
-void printNote(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
-  const bool forDrawing = options.convert.fit.fitFor == FitFor::kDrawing;
-  const bool levelSet = grid.stored().descriptor.gridClass == GridClass::kLevelSet;
-  if (forDrawing && levelSet && grid.stored().field.fitFor == FitFor::kVoxels)
-    out << cli::printable(grid.uniqueName)
-        << ": fitted for voxels, because the sum of a level set cannot be drawn\n";
+void printNote(const ConvertedGrid& grid, std::ostream& out) {
   printSurface(grid, out);
-  if (grid.psnrBetween)
-    out << cli::printable(grid.uniqueName) << ": the sum between voxels has "
-        << cli::decibels(*grid.psnrBetween) << " dB\n";
   if (!grid.twinOf) {
     printRemark(grid, out);
     return printChoice(grid, out);
@@ -141,7 +133,7 @@ void printFitted(const Options& options, const RunRecord& record, std::ostream& 
       printOverlap(options, record.grids[g], out);
     }
     printInactive(record, record.grids[g], out);
-    printNote(options, record.grids[g], out);
+    printNote(record.grids[g], out);
   }
 }
 

@@ -65,7 +65,6 @@ esvr_grid describe(const StoredGrid& grid) {
   d.active_voxels = grid.activeVoxels;
   d.ellipsoids = grid.field.ellipsoidCount();
   d.has_residual = grid.residual ? 1 : 0;
-  d.for_drawing = grid.field.fitFor == FitFor::kDrawing ? 1 : 0;
   return d;
 }
 

@@ -59,13 +59,6 @@ void requireOneKappa(const StoredGrid& grid) {
                            "': its ellipsoids have kappas of their own");
 }
 
-/// The voxels of a grid whose ellipsoids are meant to be drawn. Intensities that are solved for the
-/// voxels of the source instead would draw a worse picture between them.
-std::optional<SparseVolume> ownVoxels(const StoredGrid& grid, const VoxelMemory& memory) {
-  if (grid.field.fitFor == FitFor::kVoxels) return std::nullopt;
-  return decodeGrid(grid, {.memory = memory});
-}
-
 }  // namespace
 
 namespace {
@@ -92,12 +85,8 @@ CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
   CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
-  const auto own = ownVoxels(grid, memoryOf(source));
-  TrialMaker maker(withOneThreshold(grid), {.source = source,
-                                            .box = box,
-                                            .device = options.device,
-                                            .solvedFor = own ? &*own : nullptr,
-                                            .peak = options.peak});
+  TrialMaker maker(withOneThreshold(grid),
+                   {.source = source, .box = box, .device = options.device, .peak = options.peak});
   Trial chosen = choose(maker, options);
   // the trials know one threshold, no mask, and no voxels outside the active box that become the background
   const bool sameRule = hasOneThreshold(grid) && common(box, grid.activeBox) == box;

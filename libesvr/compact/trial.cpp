@@ -101,8 +101,8 @@ std::vector<float> intensitiesOfFirstLayers(const Trial& trial, std::size_t laye
 
 TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
     : bricks_(grid.bricks),
-      target_{target.solvedFor ? *target.solvedFor : target.source, format::ruleOf(grid),
-              target.box, bricks_, grid.topology != TopologyKind::kThreshold},
+      target_{target.source, format::ruleOf(grid), target.box, bricks_,
+              grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOf(knownCorners(target_))),
       sampleTarget_{target_.source, target_.rule, target.box, sampleBricks_, true},
       problem_(target_, target.device),
@@ -110,11 +110,6 @@ TrialMaker::TrialMaker(const StoredGrid& grid, const TrialTarget& target)
       field_(grid.field),
       quick_(target.quick),
       peak_(target.peak ? *target.peak : peakOf(target.source)) {
-  if (target.solvedFor) {
-    sourceTarget_.emplace(IntensityTarget{target.source, target_.rule, target.box, bricks_,
-                                          target_.restrictToBricks});
-    sourceProblem_.emplace(*sourceTarget_, target.device);
-  }
   if (quick_) {
     auto intensities = intensitiesOf(field_);
     problem_.setShapes(field_);
@@ -141,9 +136,8 @@ double TrialMaker::measure(const Trial& trial) {
 
 /// The error of a field against the source.
 StoredError TrialMaker::errorOf(const Field& field, std::span<const float> intensities) {
-  IntensityProblem& problem = sourceProblem_ ? *sourceProblem_ : problem_;
-  problem.setShapes(field);
-  return problem.error(intensities);
+  problem_.setShapes(field);
+  return problem_.error(intensities);
 }
 
 double TrialMaker::squaresOf(double psnr) const {
@@ -168,14 +162,6 @@ void TrialMaker::quantiseChunks(Trial& trial) const {
 
 Trial TrialMaker::make(const QuantiserSteps& steps) {
   return std::move(make(std::span(&steps, 1)).front());
-}
-
-std::vector<Trial> TrialMaker::make(std::span<const QuantiserSteps> steps) {
-  auto trials = make(steps, problem_);
-  if (!sourceProblem_) return trials;
-  for (Trial& trial : trials)
-    trial.error = errorOf(trial.field, intensitiesOf(trial.field)).squares;
-  return trials;
 }
 
 std::vector<Trial> TrialMaker::sample(std::span<const QuantiserSteps> steps) {

@@ -28,8 +28,6 @@ struct TrialTarget {
   const SparseVolume& source;
   Box box;
   Device device;
-  /// The voxels for which intensities are solved, if these are not the source's.
-  const SparseVolume* solvedFor = nullptr;
   std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(source)
   /// Trials are rounded and counted only: the intensities are not solved for, and the error of a trial
   /// is that of the float32 field. \ref TrialMaker::measure gives the true one.
@@ -59,7 +57,9 @@ class TrialMaker {
   /// Rounds the shapes, solves for the intensities with the rounded shapes, and rounds these.
   [[nodiscard]] Trial make(const QuantiserSteps& steps);
   /// Makes several trials at once, each with the same result as alone.
-  [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps);
+  [[nodiscard]] std::vector<Trial> make(std::span<const QuantiserSteps> steps) {
+    return make(steps, problem_);
+  }
   /// Makes trials for comparison with each other. The intensities are solved and the errors are
   /// measured on a sample of the bricks only; the bytes are those of all ellipsoids.
   [[nodiscard]] std::vector<Trial> sample(std::span<const QuantiserSteps> steps);
@@ -84,8 +84,6 @@ class TrialMaker {
   std::vector<Coord> sampleBricks_;
   IntensityTarget sampleTarget_;
   IntensityProblem problem_, sampleProblem_;
-  std::optional<IntensityTarget> sourceTarget_;    ///< if intensities are not solved for the source
-  std::optional<IntensityProblem> sourceProblem_;  ///< measures errors against sourceTarget_
   Field field_;  ///< float32 field with optimal intensities, from which the trials' solver starts
   std::vector<std::vector<double>> curvature_;  ///< sum of phi^2 of each ellipsoid, by chunk
   bool quick_;

@@ -145,8 +145,6 @@ void requirePossible(const ConvertOptions& options) {
     throw UsageError("voxels need a goal: a PSNR, a size, a bound or lossless storage");
   if (wanted == Representation::kVoxels && options.storage.form == Storage::kFloat32)
     throw UsageError("float32 storage is a form of ellipsoids; it excludes voxels");
-  if (wanted == Representation::kVoxels && options.fit.fitFor == FitFor::kDrawing)
-    throw UsageError("a fit for drawing needs ellipsoids; it excludes voxels");
   const bool wantsEllipsoids =
       wanted == Representation::kEllipsoids || options.storage.form == Storage::kFloat32;
   if (wantsEllipsoids && std::holds_alternative<BoundGoal>(options.goal))
@@ -194,7 +192,7 @@ bool keepsVoxels(const ConvertOptions& options) {
                           std::holds_alternative<PsnrGoal>(options.goal);
   return options.previous && options.previous->voxels && hasQuality &&
          options.representation == Representation::kAuto &&
-         options.storage.form == Storage::kCompact && options.fit.fitFor == FitFor::kVoxels;
+         options.storage.form == Storage::kCompact;
 }
 
 /// The mask of the previous frame, moved to where the voxels of the source are.
@@ -302,8 +300,6 @@ Conversion convertVolume(const ConvertInput& given, const ConvertOptions& option
                            given.simplified ? given.simplified : &masks};
   own.fit.cancel = CancelScope::token();
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
-  if (own.fit.narrowBand) own.fit.fitFor = FitFor::kVoxels;
-  if (own.fit.fitFor == FitFor::kDrawing) own.representation = Representation::kEllipsoids;
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
   own.representation = possibleRepresentation(input, own);
   const auto convertTo = [](const Job& job) {

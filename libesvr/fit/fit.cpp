@@ -53,7 +53,6 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   const auto ellipsoids = optimiser->ellipsoids();
   result.field = exportField(ellipsoids,
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
-  result.field.fitFor = options.fitFor;
   result.range = rangeOf(volume.background, target);
   result.kappaLearned = plan.learnKappa;
   result.end = end.end;

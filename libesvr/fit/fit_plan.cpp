@@ -49,8 +49,6 @@ void checkOptions(const FitOptions& options) {
   if (options.peak && !(*options.peak > 0.0 && std::isfinite(*options.peak)))
     throw UsageError("the peak must be positive");
   if (options.kappa && !std::isfinite(*options.kappa)) throw UsageError("kappa must be finite");
-  if (!(options.voxelShare >= 0.0 && options.voxelShare <= 1.0))
-    throw UsageError("the share of iterations at voxels must be between 0 and 1");
   if (options.chunkVoxels && *options.chunkVoxels == 0)
     throw UsageError("a chunk must have at least 1 voxel");
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
@@ -60,7 +58,6 @@ void applyOptions(const FitOptions& options, FitTarget& target) {
   target.saturates = true;
   target.narrowBand = options.narrowBand;
   target.bothSigns = options.bothSigns.value_or(false);
-  if (options.fitFor == FitFor::kDrawing) target.voxelShare = options.voxelShare;
 }
 
 float firstKappa(const FitOptions& options, const Tuning& tuning) {

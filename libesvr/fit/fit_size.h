@@ -12,13 +12,11 @@ struct FitSize {
   std::size_t bricks = 0;
   std::uint64_t activeVoxels = 0;
   bool narrowBand = false;  ///< see FitOptions
-  bool between = false;     ///< some iterations compare between voxels
   bool constants = false;   ///< the target has constants
 };
 
 [[nodiscard]] inline FitSize sizeOf(const FitTarget& target) {
-  return {target.bricks.size(), target.activeVoxels, target.narrowBand, target.betweenVoxels(),
-          !target.constants.empty()};
+  return {target.bricks.size(), target.activeVoxels, target.narrowBand, !target.constants.empty()};
 }
 
 }  // namespace esvr

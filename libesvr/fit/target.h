@@ -29,18 +29,13 @@ struct FitTarget : TargetScale {
   Box box;  ///< box of the PSNR, relative to the volume's origin
   double boxVoxels = 0.0;
   std::uint64_t activeVoxels = 0;
-  bool saturates = false;   ///< sums are clamped to this range
-  bool narrowBand = false;  ///< see FitOptions
-  bool bothSigns = false;   ///< see FitOptions
-  /// Share of the iterations that compare at the voxels; the others compare between them.
-  double voxelShare = 1.0;
+  bool saturates = false;                          ///< sums are clamped to this range
+  bool narrowBand = false;                         ///< see FitOptions
+  bool bothSigns = false;                          ///< see FitOptions
   const std::vector<BrickMask>* active = nullptr;  ///< active masks of the volume's bricks
   /// Largest scale, voxels, where it is less than Tuning::largestScale.
   double largestScale = std::numeric_limits<double>::infinity();
   std::optional<Box> within{};  ///< box of bricks outside which errors do not count; default: none
-
-  /// \return whether some iterations compare between voxels
-  [[nodiscard]] bool betweenVoxels() const { return voxelShare < 1.0; }
 };
 
 /// \param peak  peak of the PSNR in the units of the volume; default: peakOf(volume)

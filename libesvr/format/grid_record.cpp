@@ -151,7 +151,6 @@ void putGrid(ByteWriter& out, const StoredGrid& grid, const std::vector<ChunkRec
   putVoxelFacts(out, grid);
   out.put(grid.field.background);
   putKernel(out, grid.field.kernel);
-  putEnum(out, grid.field.fitFor);
   out.put(std::uint32_t(chunks.size()));
   if (chunks.size() == 1) putChunk(out, chunks.front());
 }
@@ -162,7 +161,6 @@ GridRecord getGrid(ByteReader& in) {
   getVoxelFacts(in, record.grid);
   record.grid.field.background = in.get<float>();
   record.grid.field.kernel = getKernel(in);
-  record.grid.field.fitFor = in.getEnum(FitFor::kDrawing, "purpose of the fit");
   record.chunkCount = in.get<std::uint32_t>();
   if (record.chunkCount == 1) record.chunks.push_back(getChunk(in));
   return record;

@@ -67,7 +67,7 @@ class CudaFieldRenderers final : public Renderer {
   CudaFieldRenderers(const Field& field, const Device& device, const RendererLimits& limits,
                      const RevoxeliseOptions& voxels)
       : field_(field), device_(device), limits_(limits), voxels_(voxels) {
-    (void)of(fittedBetween(field));
+    (void)of(Between::kVoxels);
   }
 
   Image draw(const RenderOptions& options) override { return of(options.between).draw(options); }

@@ -94,7 +94,7 @@ void addRays(const SceneWish& scene, Words& to) {
   if (post != slice) to.add("--classification", post ? "post" : "pre");
   const bool off = o.lod == LevelOfDetail::kOff;
   if (off != slice) to.add("--lod", off ? "off" : "auto");
-  if (o.between) to.add("--between", *o.between == Between::kSum ? "sum" : "voxels");
+  if (o.between == Between::kSum) to.add("--between", "sum");
   if (o.shading) to.add("--shade");
   if (const auto& b = o.background) to.add("--background", listText({b->r, b->g, b->b}));
 }

@@ -13,13 +13,9 @@ RenderOptions withCancel(RenderOptions options, const CancelToken* cancel) {
   return options;
 }
 
-/// The reference is drawn like the grid, but between its voxels as its own file says.
+/// The reference is drawn like the grid.
 RenderOptions referenceOptions(const Painting::Input& input) {
-  SceneWish scene = input.scene;
-  scene.place = input.scene.compare->with;
-  RenderOptions options = renderOptionsOf(input.collection, input.scene, input.size);
-  options.between = renderOptionsOf(input.collection, scene, input.size).between;
-  return withCancel(options, input.cancel);
+  return withCancel(renderOptionsOf(input.collection, input.scene, input.size), input.cancel);
 }
 
 }  // namespace

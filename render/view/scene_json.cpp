@@ -42,13 +42,6 @@ render::Look lookIn(const Members& members) {
   return look;
 }
 
-std::optional<Between> betweenIn(const Members& members) {
-  return members
-      .choice<std::optional<Between>>(
-          "between", {{"auto", std::nullopt}, {"voxels", Between::kVoxels}, {"sum", Between::kSum}})
-      .value_or(std::nullopt);
-}
-
 std::optional<Rgb> backgroundIn(const Members& members) {
   const auto color = members.vector("background");
   if (!color) return std::nullopt;
@@ -102,7 +95,9 @@ void readRays(const Members& members, SceneWish& wish) {
               .choice<LevelOfDetail>("lod",
                                      {{"auto", LevelOfDetail::kAuto}, {"off", LevelOfDetail::kOff}})
               .value_or(slice ? LevelOfDetail::kOff : o.lod);
-  o.between = betweenIn(members);
+  o.between =
+      members.choice<Between>("between", {{"voxels", Between::kVoxels}, {"sum", Between::kSum}})
+          .value_or(o.between);
   if (members.flag("shade").value_or(false)) o.shading = Shading{};
 }
 

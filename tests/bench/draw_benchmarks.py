@@ -3,12 +3,11 @@
 
     draw_benchmarks.py fit    --bin BUILD --data DIR --out OUT   makes the files that are drawn
     draw_benchmarks.py speed  --bin BUILD --data DIR --out OUT   compares speed and errors with NanoVDB
-    draw_benchmarks.py purpose --bin BUILD --data DIR --out OUT  compares fits for voxels and for drawing
     draw_benchmarks.py parts  --bin BUILD --data DIR --out OUT   varies --depth-parts and --min-transmittance
     draw_benchmarks.py sheets --bin BUILD --data DIR --out OUT   draws ESVR, NanoVDB and their difference
     draw_benchmarks.py large  --bin BUILD --swc FILE --out OUT   draws a neuron of 50 million voxels
 
-Run `fit` first, except for `purpose`. The other commands print the rows of their Markdown tables; `sheets` writes
+Run `fit` first. The other commands print the rows of their Markdown tables; `sheets` writes
 OUT/drawing_*.png. --device chooses the device that fits and draws.
 """
 import argparse
@@ -22,9 +21,6 @@ SCENES = [("aneurism", "12000"), ("aneurism", "59000"), ("smoke1", "12000"),
           ("hydrogen_atom", "4000")]
 ITERATIONS = "1500"
 SHEETS = [("aneurism", "59000"), *SCENES[2:]]
-PURPOSES = [[], *(["--fit-for", "drawing", "--voxel-share", share]
-                  for share in ["0.75", "0.5", "0.25", "0.125", "0"])]
-PURPOSE_VIEWS = ["--turntable", "36"]
 METHODS = {"voxels": [], "sum": ["--between", "sum"]}
 PARTS = [*(["--depth-parts", parts] for parts in ["1", "4", "8", "16"]), ["--min-transmittance", "0"]]
 
@@ -80,29 +76,6 @@ def speed(arguments):
               f"{megabytes(summed['drawn'])} |", flush=True)
 
 
-def purpose_row(arguments, name, count, options):
-    """PSNR of the voxels, PSNR of pictures of the sum and of the voxels, bytes, and seconds."""
-    file, report = arguments.out / "purpose.esvr", arguments.out / "purpose.json"
-    volume = arguments.data / f"{name}.vdb"
-    run([arguments.bin / "vdb2esvr/vdb2esvr", volume, file, "--count", count, "--representation",
-         "ellipsoids", *box_of(name), *options, "--device", arguments.device, "--force", "--quiet",
-         "--report", report])
-    grid = json.loads(report.read_text())["grids"][0]
-    pictures = [bench(arguments, file, "--ref", volume, "--between", between, *PURPOSE_VIEWS)
-                for between in ["sum", "voxels"]]
-    return [grid["metrics"]["psnr_box"], *(p["image"]["psnr"]["mean"] for p in pictures),
-            grid["bytes"] / 1000, grid["seconds"]["optimise"]]
-
-
-def purpose(arguments):
-    for name, count in SCENES:
-        for options in PURPOSES:
-            share = options[-1] if options else "for voxels"
-            row = purpose_row(arguments, name, count, options)
-            print(f"| {label(name, count)} | {share} | "
-                  + " | ".join(f"{value:.1f}" for value in row) + " |", flush=True)
-
-
 def parts(arguments):
     for name, count in SCENES:
         file = esvr(arguments, name, count)
@@ -145,7 +118,7 @@ def large(arguments):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    jobs = {"fit": fit, "speed": speed, "purpose": purpose, "parts": parts, "sheets": sheets, "large": large}
+    jobs = {"fit": fit, "speed": speed, "parts": parts, "sheets": sheets, "large": large}
     parser.add_argument("what", choices=jobs)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path)

@@ -31,14 +31,6 @@ TEST_F(EsvrRender, TheSumIsShownBetweenVoxelsWhereAskedFor) {
   expectRefused({"--between", "nothing"}, 2, "--between");
 }
 
-TEST_F(EsvrRender, TheSumIsShownOfAFileThatWasFittedForDrawing) {
-  EsvrFile file = readEsvr(folder_ / "in.esvr");
-  file.grids[0].field.fitFor = FitFor::kDrawing;
-  writeEsvr(folder_ / "drawing.esvr", file);
-  EXPECT_EQ(picture("drawing.esvr").rgba, picture("in.esvr", {"--between", "sum"}).rgba);
-  EXPECT_EQ(picture("drawing.esvr", {"--between", "voxels"}).rgba, picture("in.esvr").rgba);
-}
-
 TEST_F(EsvrRender, AFileThatHoldsItsVoxelsIsDrawnFromThem) {
   const VolumeGrid grid = readGrid(folder_ / "in.vdb", "density");
   const VoxelLayer layer = exactLayer(grid.volume);

@@ -40,7 +40,6 @@ Table vdb2esvrTests() {
           {"--chunk-voxels", "Vdb2EsvrOption.chunkVoxelsDivideTheFit"},
           {"--count", "Vdb2EsvrOption.countIsTheNumberOfEllipsoids"},
           {"--device", "Vdb2EsvrOption.devicesAreTakenAsNamed"},
-          {"--fit-for", "Vdb2EsvrOption.fitForDrawingIsStoredInTheFile"},
           {"--force", "Vdb2Esvr.keepsAnExistingFileUnlessForced"},
           {"--frames", "SequenceFiles.haveTheBytesOfSingleFilesOnAnyNumberOfThreads"},
           {"--gop", "OneFile.hasTheFramesByTheirNumbers"},
@@ -78,8 +77,7 @@ Table vdb2esvrTests() {
           {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
           {"--storage-loss", "Vdb2EsvrOption.storageLossBuysBytes"},
           {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
-          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"},
-          {"--voxel-share", "Vdb2EsvrOption.voxelSharesLowerTheErrorAtTheVoxels"}};
+          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"}};
 }
 
 Table esvr2vdbTests() {

@@ -85,23 +85,6 @@ TEST_F(Vdb2EsvrOption, representationIsTheOneWanted) {
   EXPECT_LE(chosen[chosen["stored"].get<std::string>()]["bytes"], chosen[other]["bytes"]);
 }
 
-TEST_F(Vdb2EsvrOption, fitForDrawingIsStoredInTheFile) {
-  for (const FitFor fitFor : {FitFor::kVoxels, FitFor::kDrawing}) {
-    const Json grid = quick({"--fit-for", fitFor == FitFor::kDrawing ? "drawing" : "voxels"});
-    EXPECT_EQ(grid["representation"]["stored"], "ellipsoids");
-    EXPECT_EQ(readEsvr(at("out.esvr")).grids[0].field.fitFor, fitFor);
-  }
-}
-
-TEST_F(Vdb2EsvrOption, voxelSharesLowerTheErrorAtTheVoxels) {
-  const auto psnrAt = [&](const std::string& share) {
-    const Json grid = convert({"--count", "40", "--iterations", "100", "--fit-for", "drawing",
-                               "--voxel-share", share})["grids"][0];
-    return grid["metrics"]["psnr_box"].get<double>();
-  };
-  EXPECT_GT(psnrAt("1"), psnrAt("0"));
-}
-
 TEST_F(Vdb2EsvrOption, secondsEndTheFit) {
   const Json grid =
       convert({"--count", "20", "--iterations", "10000000", "--seconds", "0.2"})["grids"][0];

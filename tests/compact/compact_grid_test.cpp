@@ -22,10 +22,8 @@ struct Example {
   StoredGrid grid;
 };
 
-Example fitted(const SparseVolume& volume, bool narrowBand = false,
-               FitFor fitFor = FitFor::kVoxels) {
+Example fitted(const SparseVolume& volume, bool narrowBand = false) {
   FitOptions options;
-  options.fitFor = fitFor;
   options.count = 60;
   options.iterations = 150;
   options.kappa = 2.0f;
@@ -50,25 +48,6 @@ double psnrOf(const Example& example, const StoredGrid& grid) {
 }
 double iouOf(const Example& example, const StoredGrid& grid) {
   return metricsOf(example, grid).iou;
-}
-
-// Intensities that are solved for the voxels of the source would lead away from the sum that was
-// fitted between voxels.
-TEST(CompactGrid, KeepsTheSumOfAFitForDrawing) {
-  const Example forDrawing = fitted(test::tubeVolume(), false, FitFor::kDrawing);
-  const SparseVolume own = decodeGrid(forDrawing.grid);
-  const double before = psnrOf(forDrawing, forDrawing.grid);
-  const auto kept = compactGrid(forDrawing.grid, forDrawing.source, {.loss = 0.3});
-  const double after = psnrOf(forDrawing, kept.grid);
-  EXPECT_GE(after, before - 0.3 - 1e-4);
-  EXPECT_NEAR(kept.loss, before - after, 1e-3);
-  StoredGrid asVoxels = forDrawing.grid;
-  asVoxels.field.fitFor = FitFor::kVoxels;
-  const auto moved = compactGrid(asVoxels, forDrawing.source, {.bytes = kept.bytes});
-  const auto psnrOfOwn = [&](const StoredGrid& grid) {
-    return compareVolumes(own, decodeGrid(grid)).psnrBox;
-  };
-  EXPECT_GT(psnrOfOwn(kept.grid), psnrOfOwn(moved.grid) + 3.0);
 }
 
 TEST(CompactGrid, CostsNoMoreThanWasAllowed) {

@@ -40,19 +40,6 @@ double psnrOf(const SparseVolume& volume, const StoredGrid& grid) {
   return compareVolumes(volume, decodeGrid(grid)).psnrBox;
 }
 
-TEST(ConvertVolume, FitsALevelSetForItsVoxelsAndOtherGridsAsAsked) {
-  GridDescriptor levelSet;
-  levelSet.gridClass = GridClass::kLevelSet;
-  ConvertOptions options = optionsFor(FitGoal{});
-  options.fit.count = 30;
-  options.fit.fitFor = FitFor::kDrawing;
-  const auto purposeOf = [&](const GridDescriptor& descriptor, const SparseVolume& volume) {
-    return convertVolume({descriptor, volume}, options).grid.field.fitFor;
-  };
-  EXPECT_EQ(purposeOf(levelSet, test::levelSetVolume()), FitFor::kVoxels);
-  EXPECT_EQ(purposeOf(kDescriptor, test::tubeVolume()), FitFor::kDrawing);
-}
-
 TEST(ConvertToSize, LandsWithinTwoPerCentUnderTheSize) {
   const SparseVolume volume = test::tubeVolume();
   for (const std::uint64_t bytes : {900u, 1500u}) {

@@ -14,7 +14,6 @@
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
-#include "esvr/psnr_between.h"
 #include "fit/chunks/chunk_target.h"
 #include "fit/chunks/chunks_for.h"
 #include "fit/chunks/divide_bricks.h"
@@ -37,10 +36,9 @@ std::vector<BrickChunk> chunksOf(const SparseVolume& volume) {
 }
 
 std::vector<float> residualsOf(const FitTarget& target, const Kernel& kernel,
-                               const std::vector<Ellipsoid>& ellipsoids, const Offset& offset) {
+                               const std::vector<Ellipsoid>& ellipsoids) {
   CpuPass pass(target, kernelConstants<double>(kernel));
   pass.rebuild(ellipsoids, 1.0);
-  pass.setOffset(offset);
   std::vector<float> residuals;
   pass.residuals(ellipsoids, residuals);
   residuals.resize(target.values.size());
@@ -64,8 +62,8 @@ TEST_P(Constants, ActLikeEllipsoidsThatAreNotFitted) {
   part.target.saturates = GetParam();
   FitTarget whole = makeTarget(volume, std::nullopt);
   whole.saturates = GetParam();
-  const auto found = residualsOf(part.target, kernel, fitted, kAtVoxels);
-  const auto expected = residualsOf(whole, kernel, all, kAtVoxels);
+  const auto found = residualsOf(part.target, kernel, fitted);
+  const auto expected = residualsOf(whole, kernel, all);
   for (std::size_t v = 0; v < expected.size(); ++v) ASSERT_NEAR(found[v], expected[v], 1e-5) << v;
 }
 INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& saturates) {
@@ -133,18 +131,16 @@ SparseVolume decoded(const FitResult& result) {
 
 class ChunksOn : public test::OnDevice {
  protected:
-  [[nodiscard]] FitResult fitted(std::optional<std::uint64_t> chunkVoxels,
-                                 FitFor fitFor = FitFor::kVoxels) const {
+  [[nodiscard]] FitResult fitted(std::optional<std::uint64_t> chunkVoxels) const {
     FitOptions options = shortFit(chunkVoxels);
     options.device = device_;
-    options.fitFor = fitFor;
     return fit(volume_, options);
   }
   SparseVolume volume_ = longTube();
 };
 
 // Chunks of 2000 voxels are extreme: their halo has more bricks than they have themselves.
-// The fit loses 1.0 dB in them, and 0.5 dB between voxels.
+// The fit loses 1.0 dB in them.
 TEST_P(ChunksOn, SlowAreNearlyAsGoodAsOneChunk) {
   const FitResult one = fitted(std::nullopt), several = fitted(kChunkVoxels);
   EXPECT_GT(several.chunks, 4u);
@@ -152,15 +148,6 @@ TEST_P(ChunksOn, SlowAreNearlyAsGoodAsOneChunk) {
   EXPECT_LE(several.field.ellipsoidCount(), 300u);
   EXPECT_GT(several.field.ellipsoidCount(), 290u);
   EXPECT_NEAR(several.curve.back().psnrBox, psnrOverBox(volume_, decoded(several)), 0.3);
-}
-
-TEST_P(ChunksOn, SlowAreNearlyAsGoodBetweenVoxels) {
-  const auto between = [&](const FitResult& result) {
-    return psnrBetween(volume_, result.field, {.range = result.range});
-  };
-  const FitResult one = fitted(std::nullopt, FitFor::kDrawing);
-  const FitResult several = fitted(kChunkVoxels, FitFor::kDrawing);
-  EXPECT_GT(between(several), between(one) - 1.5);
 }
 
 TEST_P(ChunksOn, SlowGiveTheSameBitsAgain) {

@@ -3,8 +3,7 @@
 // for a random field, including bricks that only supports reach, and for ellipsoids of every shape
 // and kernel (gradient_cases.h). For these shapes the adjoint identity <g, dV> = <dL, dtheta> is
 // checked for a random g, in the pass of the default fit, where g is the residual of a random
-// target, and in the pass of the paper's method, whose input is g. The gradients at an offset are
-// those of a volume that was moved in float64.
+// target, and in the pass of the paper's method, whose input is g.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +15,6 @@
 #include "fit/paper/cpu_paper_pass.h"
 #include "fit/parameter_gradient.h"
 #include "gradient_cases.h"
-#include "interpolate.h"
 #include "random_ellipsoids.h"
 #include "reference_sum.h"
 
@@ -120,55 +118,6 @@ TEST_P(GradientKappa, AgreesWithCentralDifferencesByKappa) {
   // The precision of sums is as above. For a Gaussian the slope is nothing compared with the
   // rounding of the loss.
   EXPECT_NEAR(slope, difference, 3e-4 * std::max(terms * kernelWidth(k).logMByKappa, 1.0));
-}
-
-/// The target at an offset by interpolation in float64. Beyond the bricks next to those of the
-/// volume it is 0.
-FitTarget movedTarget(const SparseVolume& volume, const FitTarget& target, const Offset& offset) {
-  FitTarget moved = target;
-  moved.bricks.clear();
-  moved.values.clear();
-  const auto at = [&](Coord v) { return double(esvr::valueAt(volume, v)) * target.scale; };
-  for (int x = -1; x <= kSide / kBrickSide; ++x)
-    for (int y = -1; y <= kSide / kBrickSide; ++y)
-      for (int z = -1; z <= kSide / kBrickSide; ++z) {
-        moved.bricks.push_back({x, y, z});
-        for (int v = 0; v < kBrickVoxels; ++v)
-          moved.values.push_back(
-              float(test::interpolate(offset, Coord{x, y, z} * kBrickSide + voxelLocal(v), at)));
-      }
-  return moved;
-}
-
-// A pass at an offset is the pass at the voxels for a moved target and moved ellipsoids. Both sides
-// are float32 sums over the same few thousand voxels.
-TEST_P(GradientKappa, AtAnOffsetIsThatOfAMovedVolume) {
-  const SparseVolume volume = denseVolume();
-  FitTarget target = makeTarget(volume, std::nullopt);
-  target.saturates = true;
-  const auto k = kernelConstants<double>({.kappa = GetParam()});
-  const auto ellipsoids = randomEllipsoids(3, 1.5, 2.0);
-  for (const Offset& offset : {Offset{0.3, -0.4, 0.1}, Offset{-0.2, 0.5, -0.5}}) {
-    CpuPass pass(target, k);
-    pass.rebuild(ellipsoids, 0.1 + kMaxOffset);
-    pass.setOffset(offset);
-    std::vector<EllipsoidGradient> found(ellipsoids.size()), expected(ellipsoids.size());
-    pass.gradients(ellipsoids, found);
-
-    const FitTarget moved = movedTarget(volume, target, offset);
-    auto back = ellipsoids;
-    for (Ellipsoid& p : back) p.center = movedBack(p.center, offset);
-    CpuPass reference(moved, k);
-    reference.rebuild(back, 0.1);
-    reference.gradients(back, expected);
-    for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
-      double largest = 0.0;
-      for (const double g : expected[i].byParameter) largest = std::max(largest, std::abs(g));
-      for (int n = 0; n < kParameters; ++n)
-        EXPECT_NEAR(found[i].byParameter[n], expected[i].byParameter[n], 1e-4 * largest)
-            << "ellipsoid " << i << ", parameter " << n;
-    }
-  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, GradientKappa, testing::Values(-30.f, -3.f, 2.f, 5.f));

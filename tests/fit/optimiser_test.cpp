@@ -1,8 +1,7 @@
 // Plan: the operations of a run are tested on every device. Growth reaches its count and places
 // seeds where the error is large. Relocation moves the least useful ellipsoids only. Ellipsoids
-// that reach no voxel are dropped, and without an error there are no seeds. A fit for drawing is
-// closer to the volume between voxels. A whole fit has the same bits in three runs and at a distant
-// position. An optimiser continues from the state of another. Without a GPU, its tests skip.
+// that reach no voxel are dropped, and without an error there are no seeds. A whole fit has the same
+// bits in three runs and at a distant position. An optimiser continues from the state of another. Without a GPU, its tests skip.
 
 #include "fit/optimiser.h"
 
@@ -13,7 +12,6 @@
 #include <cmath>
 
 #include "esvr/error.h"
-#include "esvr/psnr_between.h"
 #include "support/on_device.h"
 #include "volumes.h"
 
@@ -59,15 +57,12 @@ TEST_P(OptimiserOn, GrowsToTheCountAndLowersTheLoss) {
 }
 
 TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
-  for (const double voxelShare : {1.0, 0.25}) {
-    target_.voxelShare = voxelShare;
-    const auto inOne = make(), inMany = make();
-    inOne->growTo(30);
-    inMany->growTo(30);
-    inOne->iterate(std::vector<double>(25, 0.5));
-    for (int i = 0; i < 25; ++i) inMany->iterate(std::array{0.5});
-    EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum) << voxelShare;
-  }
+  const auto inOne = make(), inMany = make();
+  inOne->growTo(30);
+  inMany->growTo(30);
+  inOne->iterate(std::vector<double>(25, 0.5));
+  for (int i = 0; i < 25; ++i) inMany->iterate(std::array{0.5});
+  EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum);
 }
 
 // The lists are built anew, so that the steps are not quite the same.
@@ -100,20 +95,6 @@ TEST_P(OptimiserOn, LargeStepsSeeTheWholeOfEveryEllipsoid) {
     const double exact = stopped->measure().squaredSum;
     EXPECT_NEAR(going->iterate(std::array{2.0}), exact, 2e-3 * exact) << "after " << done;
   }
-}
-
-// The tube has soft walls of one voxel. A fit for voxels follows them with small ellipsoids, whose
-// sum between voxels is far from the interpolated voxels.
-TEST_P(OptimiserOn, AFitForDrawingIsCloserBetweenVoxels) {
-  FitOptions options = fitOptions(300, 200);
-  const FitResult forVoxels = fit(volume_, options);
-  options.fitFor = FitFor::kDrawing;
-  const FitResult forDrawing = fit(volume_, options);
-  EXPECT_EQ(forVoxels.field.fitFor, FitFor::kVoxels);
-  EXPECT_EQ(forDrawing.field.fitFor, FitFor::kDrawing);
-  EXPECT_GT(psnrBetween(volume_, forDrawing.field, {.range = forDrawing.range}),
-            psnrBetween(volume_, forVoxels.field, {.range = forVoxels.range}) + 3.0);
-  EXPECT_LT(forDrawing.curve.back().psnrBox, forVoxels.curve.back().psnrBox);
 }
 
 // The volume's values have one sign. Only with both signs may ellipsoids subtract from the sum.

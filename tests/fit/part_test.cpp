@@ -77,7 +77,6 @@ TEST_F(PartKeys, ChangeWithAllThatTheResultDependsOn) {
       [](Inputs& in) { in.options.device.kind = DeviceKind::kCuda; },
       [](Inputs& in) { in.options.narrowBand = true; },
       [](Inputs& in) { in.options.bothSigns = true; },
-      [](Inputs& in) { in.options.fitFor = FitFor::kDrawing; },
       [](Inputs& in) { in.halo = 3; },
       [](Inputs& in) { in.start.chunk = 1; },
       [](Inputs& in) { in.start.kernel.kappa = 5.0f; },

@@ -38,7 +38,7 @@ namespace at {
 constexpr std::size_t kNameLength = 0, kClass = 4, kValueType = 5, kBackground = 6, kAffine = 22,
                       kItems = 23, kTopology = 27, kWithinRange = 28, kThreshold = 29,
                       kValueMin = 65, kFieldBackground = 73, kKernel = 77, kKappa = 78,
-                      kEpsilon = 82, kFitFor = 86, kChunkCount = 87, kChunkBox = 103, kCount = 127;
+                      kEpsilon = 82, kChunkCount = 86, kChunkBox = 102, kCount = 126;
 }  // namespace at
 
 /// A grid with one chunk of four ellipsoids with all attributes, bricks and a curve.
@@ -177,7 +177,6 @@ const ContentLie kContentLies[] = {
     {"LongName", pokeGrid(at::kNameLength, 0xffffffffu), "ends within a value"},
     {"UnknownClass", pokeGrid(at::kClass, kNoEnumerator), "unknown grid class 200"},
     {"UnknownValueType", pokeGrid(at::kValueType, kNoEnumerator), "unknown value type"},
-    {"UnknownPurpose", pokeGrid(at::kFitFor, kNoEnumerator), "unknown purpose of the fit"},
     {"UnknownTopology", pokeGrid(at::kTopology, kNoEnumerator), "unknown topology"},
     {"UnknownKernel", pokeGrid(at::kKernel, kNoEnumerator), "unknown kernel"},
     {"AffineNeitherNor", pokeGrid(at::kAffine, kNoEnumerator), "unknown mark of an affine"},

@@ -110,7 +110,7 @@ def grid(data):
     for key, form in (("topology", "B"), ("within range", "B"), ("threshold", "f"),
                       ("active box", "6i"), ("active voxels", "Q"), ("range", "2f"),
                       ("field background", "f"), ("kernel", "B"), ("kappa", "f"),
-                      ("epsilon", "f"), ("fit for", "B"), ("chunk count", "I")):
+                      ("epsilon", "f"), ("chunk count", "I")):
         g[key] = r.get(form)
     g["chunks"] = [r.chunk()] if g["chunk count"] == 1 else []
     r.end()
@@ -715,7 +715,7 @@ def read(data):
 def check_one_ellipsoid(sections):
     g = sections["grid", 0, NONE]
     assert g["name"] == b"density" and g["background"] == 1.0 and g["kernel"] == 0
-    assert g["kappa"] == 2.0 and abs(g["epsilon"] - 0.006) < 1e-9 and g["fit for"] == 0
+    assert g["kappa"] == 2.0 and abs(g["epsilon"] - 0.006) < 1e-9
     assert g["chunks"][0]["origin"] == (10, -20, 30) and g["chunks"][0]["count"] == 1
     low, high = g["chunks"][0]["box"][:3], g["chunks"][0]["box"][3:]
     assert all(a <= b <= c for a, b, c in zip(low, (11.5, -22.25, 1030.0), high))
@@ -731,7 +731,6 @@ def check_level_set(sections):
     assert (g["class"], g["values"], g["topology"], g["within range"]) == (1, 2, 1, 0)
     assert g["background"] == 0.3 and g["map type"] == b"NonlinearFrustumMap"
     assert g["affine"] is None and g["kernel"] == 1 and g["active voxels"] == 4
-    assert g["fit for"] == 1
     assert sections["bricks", 0, NONE] == [(-8, -8, 1 << 20), (-8, 0, 0), (0, -16, 8), (0, 0, -8)]
     assert ("rotations", 0, 0) not in sections
 

@@ -64,7 +64,6 @@ std::string difference(const Ellipsoids& a, const Ellipsoids& b) {
 std::string difference(const Field& a, const Field& b) {
   if (!sameBits(a.background, b.background)) return "background of the field";
   if (!(a.kernel == b.kernel)) return "kernel";
-  if (a.fitFor != b.fitFor) return "purpose of the fit";
   if (a.chunks.size() != b.chunks.size()) return "number of chunks";
   for (std::size_t c = 0; c < a.chunks.size(); ++c) {
     if (a.chunks[c].origin != b.chunks[c].origin) return "origin of a chunk";
@@ -139,7 +138,6 @@ StoredGrid levelSetGrid(std::size_t ellipsoids) {
   d.transform.map = bytesOf("frustum");
   grid.field.background = 0.3f;
   grid.field.kernel = {KernelForm::kPaper, 5.0f, Kernel::kDefaultEpsilon};
-  grid.field.fitFor = FitFor::kDrawing;
   grid.field.chunks = {{{}, sampleEllipsoids(ellipsoids, 2, {.rotations = false})}};
   grid.topology = TopologyKind::kBricks;
   grid.bricks = {{-8, -8, 1 << 20}, {-8, 0, 0}, {0, -16, 8}, {0, 0, -8}};

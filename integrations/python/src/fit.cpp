@@ -36,7 +36,6 @@ constexpr Word<Representation> kRepresentations[] = {{"auto", Representation::kA
                                                      {"voxels", Representation::kVoxels}};
 constexpr Word<Storage> kStorages[] = {{"compact", Storage::kCompact},
                                        {"float32", Storage::kFloat32}};
-constexpr Word<FitFor> kPurposes[] = {{"voxels", FitFor::kVoxels}, {"drawing", FitFor::kDrawing}};
 
 /// The goals of which one may be given.
 struct Goals {
@@ -130,10 +129,10 @@ constexpr const char* kFitText =
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
     "lossless: every active voxel bit for bit. The default is the quality of the preset ('draft',\n"
     "'standard' or 'high'), over the active voxels.\n\n"
-    "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. fit_for:\n"
-    "'voxels', or 'drawing' for sums that are evaluated between voxels. device: 'auto', 'cpu',\n"
-    "'cuda' or 'cuda:N'. progress: is called with the share of the running fit that is done, 0 to\n"
-    "1; a conversion may make several fits. Ctrl-C ends the call.";
+    "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. device:\n"
+    "'auto', 'cpu', 'cuda' or 'cuda:N'. progress: is called with the share of the running fit "
+    "that\n"
+    "is done, 0 to 1; a conversion may make several fits. Ctrl-C ends the call.";
 
 }  // namespace
 
@@ -143,14 +142,12 @@ void addFit(py::module_& module) {
       [](const Volume& volume, std::optional<double> psnr, std::optional<double> maxError,
          std::optional<std::uint64_t> size, std::optional<std::size_t> count, bool lossless,
          const std::string& preset, const std::string& representation, const std::string& storage,
-         const std::string& fitFor, const std::string& device, std::uint64_t seed,
-         const Progress& progress) {
+         const std::string& device, std::uint64_t seed, const Progress& progress) {
         ConvertOptions options;
         options.goal = goalOf({psnr, maxError, size, count, lossless});
         options.representation = valueOf("representation", representation, kRepresentations);
         options.storage.form = valueOf("storage", storage, kStorages);
         options.fit.preset = valueOf("preset", preset, kPresets);
-        options.fit.fitFor = valueOf("fit_for", fitFor, kPurposes);
         options.fit.count = count;
         options.fit.seed = seed;
         options.fit.device = selectDevice(device);
@@ -161,8 +158,7 @@ void addFit(py::module_& module) {
       py::arg("max_error") = py::none(), py::arg("size") = py::none(),
       py::arg("count") = py::none(), py::arg("lossless") = false, py::arg("preset") = "standard",
       py::arg("representation") = "auto", py::arg("storage") = "compact",
-      py::arg("fit_for") = "voxels", py::arg("device") = "auto", py::arg("seed") = 1,
-      py::arg("progress") = py::none(), kFitText);
+      py::arg("device") = "auto", py::arg("seed") = 1, py::arg("progress") = py::none(), kFitText);
 }
 
 }  // namespace esvr::python

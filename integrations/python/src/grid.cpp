@@ -150,7 +150,7 @@ void addGrid(py::module_& module) {
            "max_memory is that of esvr.read.")
       .def("evaluate", &evaluate, py::arg("points"),
            "The sum of the ellipsoids at points of shape (n, 3), in index coordinates: float32 of\n"
-           "shape (n,). It is accurate between voxels if the grid was fitted for drawing.")
+           "shape (n,). A fit constrains it at voxels only.")
       .def_property_readonly("ellipsoids", &ellipsoidsOf, "The ellipsoids (esvr.Ellipsoids).")
       .def_property_readonly(
           "ellipsoid_count", [](const Grid& g) { return g.grid->field.ellipsoidCount(); },

@@ -65,7 +65,6 @@ class MemoryCheck {
       size.activeVoxels += std::uint64_t(volume_.active[b].count());
     }
     size.narrowBand = options_.narrowBand;
-    size.between = options_.fitFor == FitFor::kDrawing;
     size.constants = chunks.size() > 1;
     return size;
   }

@@ -186,7 +186,6 @@ class ChunkedFit {
     result.secondsOptimise = std::max(0.0, result.curve.back().seconds - totals_.secondsSeed);
     result.field =
         exportField(all, {volume.origin, scene_.scale.scale, volume.background, kernel_});
-    result.field.fitFor = options_.fitFor;
     result.range = rangeOf(volume.background, scene_.scale);
     result.kappaLearned = !options_.kappa;
     result.end = endAt(result.curve.back().psnrBox);

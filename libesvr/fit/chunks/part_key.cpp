@@ -53,8 +53,6 @@ static_assert(sizeof(AdamState) == (2 * kParameters + 1) * sizeof(float));
 void addOptions(Hash& hash, const FitOptions& options) {
   hash.add(options.seed);
   hash.add(options.device.kind);
-  hash.add(options.fitFor);
-  hash.add(options.voxelShare);
   hash.add(options.narrowBand);
   hash.add(options.bothSigns);
 }

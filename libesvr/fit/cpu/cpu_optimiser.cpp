@@ -131,9 +131,7 @@ void CpuOptimiser::relocate(std::size_t count) {
 
 double CpuOptimiser::iterateOnce(double factor) {
   if (stale_) rebuildLists();
-  if (target_.betweenVoxels()) pass_.setOffset(offsetOf(iterations_++, target_.voxelShare));
   const double loss = pass_.gradients(ellipsoids_, gradients_);
-  pass_.setOffset(kAtVoxels);
   if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
   step(factor);
   return loss;
@@ -146,7 +144,6 @@ double CpuOptimiser::iterate(std::span<const double> factors) {
 }
 
 FitErrors CpuOptimiser::measure() {
-  pass_.setOffset(kAtVoxels);  // a cancelled iteration leaves its own
   buildTightLists();
   pass_.residuals(ellipsoids_, residuals_);
   return errorsOf(target_, {pass_.index(), residuals_});

@@ -57,7 +57,6 @@ class CpuOptimiser final : public Optimiser {
   std::vector<EllipsoidGradient> gradients_;
   std::vector<float> residuals_;
   double secondsSeeding_ = 0.0;
-  std::uint64_t iterations_ = 0;       ///< iterations of a fit for drawing
   std::uint64_t samplings_ = 0;        ///< number of samplings, each with its own random numbers
   std::vector<ListedSupport> listed_;  ///< the supports that the lists of the iterations hold
   std::uint32_t refused_ = 0;          ///< steps that were refused since those lists were built

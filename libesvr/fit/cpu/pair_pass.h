@@ -14,7 +14,6 @@
 #include "field/brick_pairs.h"
 #include "field/gather.h"
 #include "fit/adam.h"
-#include "fit/cpu/interpolated_brick.h"
 #include "fit/cpu/pair_tapes.h"
 #include "fit/ellipsoid.h"
 #include "fit/frame.h"
@@ -47,19 +46,14 @@ class PairPass {
     });
     listSupports();
   }
-  /// Builds the lists anew, of supports as they are to be listed, for all offsets of the fit.
+  /// Builds the lists anew, of supports as they are to be listed.
   void rebuild(std::span<const ListedSupport> listed) {
-    const double slack = kRoundingSlack + (target_.betweenVoxels() ? kMaxOffset : 0.0);
     supports_.resize(listed.size());
     forEachEllipsoid(listed.size(), [&](std::size_t i) {
-      supports_[i] = makeSupport(listed[i].center, listed[i].L, listed[i].reach, slack);
+      supports_[i] = makeSupport(listed[i].center, listed[i].L, listed[i].reach, kRoundingSlack);
     });
     listSupports();
   }
-
-  /// Sets the positions at which the following passes compare. The lists must hold all supports
-  /// that are moved by this offset.
-  void setOffset(const Offset& offset) { offset_ = offset; }
 
   /// Writes r = V - target for every brick: the target's bricks first, then other bricks that
   /// supports reach.
@@ -112,12 +106,12 @@ class PairPass {
     forEachEllipsoid(ellipsoids.size(), [&](std::size_t i) {
       const Ellipsoid& p = ellipsoids[i];
       frames_[i] = frameOf(p.center);
-      const auto center = inFrame(movedBack(p.center, offset_), frames_[i]);
+      const auto center = inFrame(p.center, frames_[i]);
       forms_[i] = makeLineForm(center, p.L, kernels_.radius(i), p.intensity);
     });
   }
 
-  /// Reads the target's values of a brick at the current offset.
+  /// Reads the target's values of a brick.
   void readTarget(std::size_t brick, float* t) const { read(target_.values, brick, t); }
 
   /// Starts a sum: r = constants - t.
@@ -186,32 +180,12 @@ class PairPass {
     moments_.resize(pairs_.pairCount());
   }
 
-  /// Reads values of a brick, `all` being those of the target's bricks, at the current offset.
+  /// Reads values of a brick, `all` being those of the target's bricks; the others have zeros.
   void read(std::span<const float> all, std::size_t brick, float* out) const {
-    if (offset_ != kAtVoxels) {
-      const Missing missing = target_.narrowBand ? Missing::kNearest : Missing::kZero;
-      interpolateBrick(around(all, brick), offset_, missing, {out, std::size_t(kBrickVoxels)});
-    } else if (const float* const values = valuesOf(all, brick)) {
-      std::copy_n(values, kBrickVoxels, out);
-    } else {
+    if (brick < target_.bricks.size())
+      std::copy_n(all.data() + brick * kBrickVoxels, kBrickVoxels, out);
+    else
       std::fill_n(out, kBrickVoxels, 0.0f);
-    }
-  }
-
-  /// The values of a brick by its number; null if it is not one of the target's.
-  [[nodiscard]] const float* valuesOf(std::span<const float> all, std::size_t brick) const {
-    if (brick >= target_.bricks.size()) return nullptr;
-    return all.data() + brick * kBrickVoxels;
-  }
-
-  /// The bricks that an interpolation at the current offset reads.
-  [[nodiscard]] InterpolatedBricks around(std::span<const float> all, std::size_t brick) const {
-    const Coord at = index_.bricks()[brick];
-    const auto axes = offsetAxes(offset_);
-    InterpolatedBricks bricks;
-    for (int n = 0; n < kInterpolatedBricks; ++n)
-      bricks[std::size_t(n)] = valuesOf(all, index_.find(interpolatedBrick(at, axes.data(), n)));
-    return bricks;
   }
 
   template <class SupportOf>
@@ -222,7 +196,6 @@ class PairPass {
 
   const FitTarget& target_;
   Kernels kernels_;
-  Offset offset_ = kAtVoxels;
   BrickIndex index_;
   BrickPairs pairs_;
   std::vector<Support> supports_;  ///< supports in the current lists

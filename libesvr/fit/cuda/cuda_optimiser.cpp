@@ -45,8 +45,6 @@ CudaOptimiser::CudaOptimiser(const FitTarget& target, const OptimiserOptions& op
       listed_(stream_.get()),
       moments_(stream_.get()),
       residual_(stream_.get()),
-      offsetTarget_(stream_.get()),
-      offsetConstants_(stream_.get()),
       brickLoss_(stream_.get()),
       chunkSums_(stream_.get()),
       slope_(stream_.get()),
@@ -101,7 +99,6 @@ StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
           .radius = radius_,
           .edge = {kernel_.slope, kernelWidth(kernel_).logMByKappa},
           .factor = factor,
-          .nextOffset = offsetAfter(n + 1),
           .sizes = tuning_.steps,
           .adam = tuning_.adam,
           .limits = limitsOf(target_, tuning_),
@@ -113,43 +110,12 @@ StepArguments CudaOptimiser::stepArguments(double factor, std::size_t n) {
           .halts = &status->halted[n + 1]};
 }
 
-void CudaOptimiser::writeForms(const Offset& offset) {
+void CudaOptimiser::writeForms() {
   launchForms({.ellipsoids = ellipsoids_.data(),
                .count = std::uint32_t(count_),
                .radius = radius_,
-               .offset = offset,
                .forms = forms_.data()},
               stream_.get());
-  formsOffset_ = offset;
-}
-
-/// Writes the forms unless they have this offset already.
-void CudaOptimiser::useForms(const Offset& offset) {
-  if (formsOffset_ != offset) writeForms(offset);
-}
-
-/// The offset of the iteration after `n` more.
-Offset CudaOptimiser::offsetAfter(std::size_t n) const {
-  return target_.betweenVoxels() ? offsetOf(iterations_ + n, target_.voxelShare) : kAtVoxels;
-}
-
-/// Makes a pass compare between voxels.
-void CudaOptimiser::compareBetween(const Offset& offset, BrickPassArguments& pass) {
-  if (offset == kAtVoxels) return;
-  const auto moved = [&](const float* values, GrowingBuffer<float>& out) {
-    launchOffsetTarget({.bricks = bricks_.view(),
-                        .brickCount = pass.scene.brickCount,
-                        .values = values,
-                        .nearest = target_.narrowBand,
-                        .offset = offset,
-                        .out = out.data(),
-                        .halted = pass.halted},
-                       stream_.get());
-    return out.data();
-  };
-  pass.target.values = moved(pass.target.values, offsetTarget_);
-  if (pass.target.constants) pass.target.constants = moved(pass.target.constants, offsetConstants_);
-  pass.target.bricks = pass.scene.brickCount;
 }
 
 void CudaOptimiser::buildLists(const SupportSource& supports) {
@@ -159,9 +125,6 @@ void CudaOptimiser::buildLists(const SupportSource& supports) {
   moments_.reserve(lists_.pairCount() * kMoments);
   chunkSums_.reserve(lists_.chunkCount() * kMoments);
   brickLoss_.reserve(bricks_.size());
-  const std::size_t values = target_.betweenVoxels() ? bricks_.size() * kBrickVoxels : 0;
-  offsetTarget_.reserve(values);
-  if (!target_.constants.empty()) offsetConstants_.reserve(values);
 }
 
 /// Builds the lists for the following steps, and clears their halt flags.
@@ -176,7 +139,7 @@ void CudaOptimiser::rebuildLists() {
   buildLists({.ellipsoids = nullptr,
               .count = count_,
               .radius = radius_,
-              .slack = kRoundingSlack + (target_.betweenVoxels() ? kMaxOffset : 0.0),
+              .slack = kRoundingSlack,
               .listed = listed_.data()});
   status_.setZero();
   threads_.listsChanged(served_);
@@ -194,7 +157,6 @@ void CudaOptimiser::buildTightLists() {
 }
 
 void CudaOptimiser::writeResiduals() {
-  useForms(kAtVoxels);
   BrickPassArguments pass = passArguments();
   pass.residual = residual_.reserve(bricks_.size() * kBrickVoxels);
   launchResiduals(pass, stream_.get());
@@ -246,7 +208,6 @@ void CudaOptimiser::step(double factor, std::size_t n) {
   StepArguments arguments = stepArguments(factor, n);
   BrickPassArguments pass = passArguments();
   pass.halted = arguments.sums.halted = arguments.halted;
-  compareBetween(offsetAfter(n), pass);
   threads_.run(stream_.get(), [&](int best) { launchGradients(pass, best, stream_.get()); });
   launchMomentSums(arguments.sums, stream_.get());
   launchStep(arguments, stream_.get());
@@ -262,8 +223,6 @@ std::size_t CudaOptimiser::look(std::size_t started) {
   loss_ = status.loss;
   stepped_ = count_;
   served_ += taken;
-  iterations_ += taken;
-  formsOffset_ = offsetAfter(0);
   stale_ = !status.canGoOn(started);
   ahead_ = std::min(stale_ ? served_ : 2 * ahead_, StepStatus::kMaxAhead);
   return taken;
@@ -273,7 +232,6 @@ double CudaOptimiser::iterate(std::span<const double> factors) {
   while (!factors.empty()) {
     CancelScope::check();
     if (stale_) withFewer([&] { rebuildLists(); });
-    useForms(offsetAfter(0));
     const std::size_t started = std::min(factors.size(), ahead_);
     double seconds = 0.0;
     {

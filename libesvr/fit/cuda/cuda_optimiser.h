@@ -12,7 +12,6 @@
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/brick_table.h"
 #include "fit/cuda/error_sums.h"
-#include "fit/cuda/offset_target.h"
 #include "fit/cuda/pair_lists.h"
 #include "fit/cuda/rank_ellipsoids.h"
 #include "fit/cuda/sample_voxels.h"
@@ -54,9 +53,7 @@ class CudaOptimiser final : public Optimiser {
 
  private:
   void setKernel();
-  void writeForms(const Offset& offset = kAtVoxels);
-  void useForms(const Offset& offset);
-  [[nodiscard]] Offset offsetAfter(std::size_t n) const;
+  void writeForms();
   void buildLists(const SupportSource& supports);
   void rebuildLists();
   void buildTightLists();
@@ -78,7 +75,6 @@ class CudaOptimiser final : public Optimiser {
   /// Places seeds. \return their number, which is below `count` if few voxels have an error
   std::size_t placeSeeds(std::size_t count, std::size_t ellipsoids, const std::uint32_t* into);
   [[nodiscard]] BrickPassArguments passArguments();
-  void compareBetween(const Offset& offset, BrickPassArguments& pass);
   [[nodiscard]] MomentSums momentSums();
   [[nodiscard]] StepArguments stepArguments(double factor, std::size_t n);
 
@@ -102,7 +98,6 @@ class CudaOptimiser final : public Optimiser {
   GrowingBuffer<Usefulness> usefulness_;
   GrowingBuffer<ListedSupport> listed_;
   GrowingBuffer<float> moments_, residual_;
-  GrowingBuffer<float> offsetTarget_, offsetConstants_;  ///< values of all bricks between voxels
   GrowingBuffer<double> brickLoss_, chunkSums_, slope_;
   std::size_t stepped_ = 0;  ///< number of ellipsoids that took part in the last step
   DeviceBuffer<StepStatus> status_;
@@ -111,14 +106,12 @@ class CudaOptimiser final : public Optimiser {
   ErrorSums errorSums_;
   std::size_t count_ = 0;
   double secondsSeeding_ = 0.0;
-  std::uint64_t samplings_ = 0;   ///< number of samplings, each with its own random numbers
-  double loss_ = 0.0;             ///< sum of r^2 before the last step
-  bool stale_ = true;             ///< whether the lists are outdated
-  std::size_t served_ = 0;        ///< steps taken with the current lists
-  std::uint64_t iterations_ = 0;  ///< steps taken in a fit for drawing
-  Offset formsOffset_ = kAtVoxels;
-  std::size_t ahead_ = 8;  ///< steps to start before the next look()
-  bool full_ = false;      ///< memory ran out, so no more ellipsoids are added
+  std::uint64_t samplings_ = 0;  ///< number of samplings, each with its own random numbers
+  double loss_ = 0.0;            ///< sum of r^2 before the last step
+  bool stale_ = true;            ///< whether the lists are outdated
+  std::size_t served_ = 0;       ///< steps taken with the current lists
+  std::size_t ahead_ = 8;        ///< steps to start before the next look()
+  bool full_ = false;            ///< memory ran out, so no more ellipsoids are added
 };
 
 /// Does work that allocates memory. If memory runs out, the scratch memory is freed and the work is

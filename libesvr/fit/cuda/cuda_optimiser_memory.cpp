@@ -28,7 +28,7 @@ void CudaOptimiser::releaseScratch() {
   sampling_ = VoxelSampling(stream_.get());
   ranking_ = EllipsoidRanking(stream_.get());
   errorSums_ = ErrorSums(stream_.get());
-  for (auto* buffer : {&moments_, &residual_, &offsetTarget_, &offsetConstants_}) buffer->release();
+  for (auto* buffer : {&moments_, &residual_}) buffer->release();
   for (auto* buffer : {&brickLoss_, &chunkSums_}) buffer->release();
   trimMemoryPool();
 }

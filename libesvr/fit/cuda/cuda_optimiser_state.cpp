@@ -41,7 +41,6 @@ FitState CudaOptimiser::state() const {
 
 std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
   rebuildLists();
-  useForms(kAtVoxels);
   launchGradients(passArguments(), threads, stream_.get());
   launchMomentSums(momentSums(), stream_.get());
   DeviceBuffer<EllipsoidGradient> out(count_, stream_.get());

@@ -41,9 +41,8 @@ double bytesOf(const FitSize& size, double ellipsoids) {
   const auto targets = double(size.bricks);
   const double reached = size.narrowBand ? 0.0 : kReachedShare * targets;
   const double arrays = size.constants ? 2.0 : 1.0;  // the values, and the constants like them
-  const double between = size.between ? arrays * (targets + reached) * kBytesOfValues : 0.0;
   return targets * (kBytesPerTarget + (arrays - 1.0) * kBytesOfValues) +
-         kSpare * (between + (targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
+         kSpare * ((targets + reached) * kBytesPerBrick + reached * kBytesPerReached +
                    ellipsoids * kBytesPerEllipsoid + pairsOf(size, ellipsoids) * kBytesPerPair);
 }
 

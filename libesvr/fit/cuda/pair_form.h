@@ -3,7 +3,6 @@
 
 #include "fit/ellipsoid.h"
 #include "fit/frame.h"
-#include "fit/offset.h"
 
 namespace esvr::cuda {
 
@@ -14,11 +13,10 @@ struct alignas(16) PairForm {
 };
 
 #if defined(__CUDACC__)
-/// \param offset  offset of the voxels at which the form is evaluated
-__device__ inline PairForm pairForm(const Ellipsoid& p, double radius, const Offset& offset = {}) {
+__device__ inline PairForm pairForm(const Ellipsoid& p, double radius) {
   const Coord frame = frameOf(p.center);
   const Matrix3 F = inverse(p.L);
-  const auto center = inFrame(movedBack(p.center, offset), frame);
+  const auto center = inFrame(p.center, frame);
   return {makeLineForm(center, p.L, radius, p.intensity), frame,
           float(radius * std::sqrt(sigma(F, 2, 2)))};
 }

@@ -57,7 +57,7 @@ __global__ void __launch_bounds__(kStepBlock) step(const StepArguments a) {
     *a.halts = 1;
   a.ellipsoids[i] = p;
   a.states[i] = adam;
-  a.forms[i] = pairForm(p, a.radius, a.nextOffset);
+  a.forms[i] = pairForm(p, a.radius);
   a.usefulness[i] = {float(sums.phi2), float(sums.rPhi),
                      float(edgeGradient(gradient, a.edge.logMByKappa))};
 }
@@ -77,7 +77,7 @@ __global__ void __launch_bounds__(kStepBlock)
 
 __global__ void __launch_bounds__(kStepBlock) writeForms(const FormArguments a) {
   const std::uint32_t i = ownEllipsoid();
-  if (i < a.count) a.forms[i] = pairForm(a.ellipsoids[i], a.radius, a.offset);
+  if (i < a.count) a.forms[i] = pairForm(a.ellipsoids[i], a.radius);
 }
 
 __global__ void __launch_bounds__(kStepBlock) shrink(const ShrinkArguments a) {

@@ -34,8 +34,7 @@ struct StepArguments {
   int* diverged;  ///< is set to 1 if an ellipsoid is not finite
   double radius;  ///< radius of the support in the unit frame
   KernelEdge edge;
-  double factor;      ///< factor of the step sizes
-  Offset nextOffset;  ///< offset of the next iteration, for the forms
+  double factor;  ///< factor of the step sizes
   StepSizes sizes;
   AdamOptions adam;
   EllipsoidLimits limits;
@@ -87,9 +86,8 @@ void launchShrink(const ShrinkArguments& arguments, cudaStream_t stream);
 struct FormArguments {
   const Ellipsoid* ellipsoids;
   std::uint32_t count;
-  double radius;              ///< radius of the support in the unit frame
-  Offset offset = kAtVoxels;  ///< offset of the voxels at which the forms are evaluated
-  PairForm* forms;            ///< output
+  double radius;    ///< radius of the support in the unit frame
+  PairForm* forms;  ///< output
 };
 void launchForms(const FormArguments& arguments, cudaStream_t stream);
 

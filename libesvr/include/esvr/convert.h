@@ -97,9 +97,7 @@ struct StorageOptions {
 struct ConvertOptions {
   Goal goal;
   Representation representation = Representation::kAuto;
-  /// narrowBand is set by the conversion. A narrow band is always fitted for its voxels, because
-  /// its sum cannot be drawn: it means nothing outside the stored bricks.
-  FitOptions fit;
+  FitOptions fit;  ///< narrowBand is set by the conversion
   StorageOptions storage;
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.

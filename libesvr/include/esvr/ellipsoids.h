@@ -44,21 +44,12 @@ struct Chunk {
 };
 inline constexpr std::int32_t kChunkExtent = 4096;
 
-/// The values that the ellipsoids of a fit approximate.
-enum class FitFor {
-  kVoxels,  ///< the voxels
-  /// The trilinear interpolation of the voxels, everywhere. The sum can then be drawn as it is. The
-  /// error at the voxels is larger than that of a fit for voxels.
-  kDrawing
-};
-
 /// A sum of ellipsoids: V(x) = background + sum over chunks and ellipsoids. Voxel (i, j, k) is
 /// sampled at x = (i, j, k).
 struct Field {
   float background = 0.0f;
   Kernel kernel;  ///< kernel of all ellipsoids; kernel.kappa is used if Ellipsoids::kappa is empty
   std::vector<Chunk> chunks;
-  FitFor fitFor = FitFor::kVoxels;
 
   [[nodiscard]] std::size_t ellipsoidCount() const;
 };

@@ -84,7 +84,6 @@ typedef struct esvr_grid {
   uint64_t active_voxels;  ///< number of active voxels of the source
   uint64_t ellipsoids;     ///< 0: the voxels themselves are stored
   int32_t has_residual;    ///< voxels are the sum of the ellipsoids and a correction
-  int32_t for_drawing;     ///< the ellipsoids were fitted for the places between voxels too
 } esvr_grid;
 
 /// Describes a grid.
@@ -106,8 +105,8 @@ esvr_status esvr_get_ellipsoids(const esvr_file* file, size_t grid, uint64_t fir
                                 esvr_ellipsoid* ellipsoids);
 
 /// Evaluates the sum of a grid's ellipsoids, clamped to the range of the source where the file says
-/// so, at any places. The sum between voxels is accurate for grids that were fitted for it
-/// (for_drawing). ESVR_USAGE for a grid that stores voxels or a residual; esvr_sample serves those.
+/// so, at any places. A fit constrains the sum at voxels only; esvr_sample interpolates between them.
+/// ESVR_USAGE for a grid that stores voxels or a residual; esvr_sample serves those.
 /// \param places  x, y and z of each place
 /// \param values  output, one for each place
 esvr_status esvr_evaluate(const esvr_file* file, size_t grid, size_t count, const double* places,

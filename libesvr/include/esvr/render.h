@@ -49,15 +49,9 @@ enum class Classification {
 /// The rule for the values of a field between its voxels.
 enum class Between {
   kVoxels,  ///< trilinear interpolation of the voxels of revoxelise(), as in renderVolume
-  /// The clamped sum of ellipsoids itself. A fit constrains it at voxels only, unless it was made
-  /// for drawing (Field::fitFor).
+  /// The clamped sum of ellipsoids itself, which a fit constrains at voxels only.
   kSum
 };
-
-/// The rule for which the ellipsoids of a field were fitted.
-[[nodiscard]] inline Between fittedBetween(const Field& field) {
-  return field.fitFor == FitFor::kDrawing ? Between::kSum : Between::kVoxels;
-}
 
 /// The rule for places where a pixel is wider than several voxels. Sums of ellipsoids (Between::kSum)
 /// and NanoVDB grids have no levels of detail.

@@ -23,7 +23,7 @@
  * @property {"pre" | "post"} classification
  * @property {boolean} shade
  * @property {"auto" | "off"} lod
- * @property {"auto" | "voxels" | "sum"} between
+ * @property {"voxels" | "sum"} between
  * @property {Triple | null} background  null: transparent
  * @property {[Triple, Triple] | null} clip
  * @property {Slice | null} slice

@@ -29,16 +29,9 @@ FitResult fitOn(const Device& device, const SparseVolume& volume) {
   return fit(volume, options);
 }
 
-struct StepCase {
-  std::string name;
-  double voxelShare;
-};
-class StepOnGpu : public test::CudaTest, public testing::WithParamInterface<StepCase> {};
-
-TEST_P(StepOnGpu, IsThatOfTheCpu) {
+TEST_F(OptimiserOnGpu, TakesTheStepOfTheCpu) {
   const SparseVolume volume = test::denseVolume();
   FitTarget target = makeTarget(volume, std::nullopt);
-  target.voxelShare = GetParam().voxelShare;
   const auto begin = test::randomEllipsoids(50, 1.0, 3.0);
   FitState state = stateOf(begin);
   const Tuning tuning;
@@ -47,8 +40,7 @@ TEST_P(StepOnGpu, IsThatOfTheCpu) {
   onGpu.iterate(std::array{0.5});
 
   CpuPass engine(target, kernelConstants<double>(Kernel{}));
-  engine.rebuild(begin, 0.5 + kMaxOffset);
-  engine.setOffset(offsetOf(0, target.voxelShare));
+  engine.rebuild(begin, 0.5);
   std::vector<EllipsoidGradient> gradients(begin.size());
   engine.gradients(begin, gradients);
   auto expected = begin;
@@ -67,30 +59,24 @@ TEST_P(StepOnGpu, IsThatOfTheCpu) {
       differing += std::abs(found[i].center[a] - expected[i].center[a]) > 1e-6;
   EXPECT_LE(differing, 2);
 }
-INSTANTIATE_TEST_SUITE_P(Steps, StepOnGpu,
-                         testing::Values(StepCase{"AtVoxels", 1.0}, StepCase{"BetweenVoxels", 0.0}),
-                         [](const auto& step) { return step.param.name; });
 
 // The rule of motion_bound.h decides when lists are built again, and not the number of steps that
 // were started at once, so batches do not change the result. With large steps, supports leave the
 // lists within a batch.
 TEST_F(OptimiserOnGpu, StepsAheadOfOutgrownListsAreTakenAgain) {
   const SparseVolume volume = test::tubeVolume();
-  FitTarget target = makeTarget(volume, std::nullopt);
-  for (const double voxelShare : {1.0, 0.25}) {
-    target.voxelShare = voxelShare;
-    CudaOptimiser inOne(target, {}, {}), inMany(target, {}, {});
-    inOne.growTo(200);
-    inMany.growTo(200);
-    inOne.iterate(std::vector<double>(60, 1.0));
-    for (int n = 0; n < 60; ++n) inMany.iterate(std::array{1.0});
-    const auto a = inOne.ellipsoids(), b = inMany.ellipsoids();
-    ASSERT_EQ(a.size(), b.size());
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      EXPECT_EQ(a[i].center, b[i].center) << i;
-      EXPECT_EQ(a[i].L, b[i].L) << i;
-      EXPECT_EQ(a[i].intensity, b[i].intensity) << i;
-    }
+  const FitTarget target = makeTarget(volume, std::nullopt);
+  CudaOptimiser inOne(target, {}, {}), inMany(target, {}, {});
+  inOne.growTo(200);
+  inMany.growTo(200);
+  inOne.iterate(std::vector<double>(60, 1.0));
+  for (int n = 0; n < 60; ++n) inMany.iterate(std::array{1.0});
+  const auto a = inOne.ellipsoids(), b = inMany.ellipsoids();
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].center, b[i].center) << i;
+    EXPECT_EQ(a[i].L, b[i].L) << i;
+    EXPECT_EQ(a[i].intensity, b[i].intensity) << i;
   }
 }
 

@@ -27,8 +27,9 @@ TEST(SceneJson, HasTheDefaultsOfEsvrRender) {
   EXPECT_EQ(wish.options.mode, usual.mode);
   EXPECT_EQ(wish.options.classification, usual.classification);
   EXPECT_EQ(wish.options.lod, usual.lod);
-  EXPECT_FALSE(wish.options.between || wish.options.shading || wish.options.clip ||
-               wish.options.background || wish.compare);
+  EXPECT_EQ(wish.options.between, usual.between);
+  EXPECT_FALSE(wish.options.shading || wish.options.clip || wish.options.background ||
+               wish.compare);
 }
 
 TEST(SceneJson, HasItsMembers) {

@@ -15,7 +15,7 @@ const kClassifications = [["pre", "Smooth: colors integrated between samples"], 
 /** @type {[string, string][]} */
 const kLevels = [["auto", "Fewer, larger voxels where pixels are larger"], ["off", "Full voxels everywhere"]];
 /** @type {[string, string][]} */
-const kBetween = [["auto", "As the file says"], ["voxels", "Interpolate decoded voxels"], ["sum", "Add up the ellipsoids exactly"]];
+const kBetween = [["voxels", "Interpolate decoded voxels"], ["sum", "Add up the ellipsoids exactly"]];
 
 /** @param {{scene: import("../types.js").Scene, onChange: (change: Partial<import("../types.js").Scene>, moving?: boolean) => void}} props */
 function Background({ scene, onChange }) {

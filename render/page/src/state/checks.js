@@ -44,7 +44,7 @@ export const kChecks = {
   classification: oneOf("pre", "post"),
   shade: isBoolean,
   lod: oneOf("auto", "off"),
-  between: oneOf("auto", "voxels", "sum"),
+  between: oneOf("voxels", "sum"),
   background: orNull((v) => isTriple(v) && v.every(isShare)),
   clip: orNull((v) => Array.isArray(v) && v.length === 2 && v.every(isTriple)),
   slice: orNull(object({ axis: oneOf("x", "y", "z"), place: isFinite })),

@@ -14,7 +14,7 @@ export const kDefaults = Object.freeze({
   classification: /** @type {const} */ ("pre"),
   shade: false,
   lod: /** @type {const} */ ("auto"),
-  between: /** @type {const} */ ("auto"),
+  between: /** @type {const} */ ("voxels"),
   background: null,
   clip: null,
   slice: null,
