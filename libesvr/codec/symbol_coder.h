@@ -85,7 +85,8 @@ class NumberModelOf {
   }
 
  private:
-  static constexpr int kModelled = 3, kRawAtOnce = 30;
+  static constexpr int kModelled = 3;
+  static constexpr int kRawAtOnce = 2 * kRawBitsAtOnce;  // what a call of raw() takes
   TreeModel<kWidthBits> width_;
   std::array<std::array<BitModel, std::size_t{1} << kModelled>, std::size_t{1} << kWidthBits> bits_;
 };

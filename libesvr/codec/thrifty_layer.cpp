@@ -6,7 +6,6 @@
 #include "codec/brick_order.h"
 #include "codec/frame_coder.h"
 #include "codec/voxel_coder.h"
-#include "codec/voxel_model.h"
 #include "core/parallel.h"
 #include "esvr/voxel_layer.h"
 
@@ -38,17 +37,18 @@ std::optional<std::uint64_t> extrapolated(const codec::CodedPart& part, std::siz
 ThriftyLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
                           const ThriftOptions& options) {
   if (layer.form != VoxelForm::kQuantised) return {std::move(layer)};
-  const auto order = codec::codingOrder(layer.bricks);
   if (options.previous && codec::isPredictable(layer, *options.previous)) {
     const codec::FrameThrift thrift{placesOf(volume, layer), options.bitPrice, options.steadiness,
                                     options.signs};
-    codec::chooseFrameCodes(order, codec::PastVoxels(*options.previous, layer), thrift, layer);
+    codec::chooseFrameCodes(codec::codingOrder(layer.bricks),
+                            codec::PastVoxels(*options.previous, layer), thrift, layer);
     return {std::move(layer)};
   }
   const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice, options.signs};
   const codec::CodedPart part =
-      codec::chooseCodes(order, codec::chooseModel(layer), thrift, options.mostBytes, layer);
-  return {std::move(layer), extrapolated(part, order.size(), options.mostBytes)};
+      codec::chooseCodes(codec::chooseModel(layer), thrift, options.mostBytes, layer);
+  const auto tooMany = extrapolated(part, layer.bricks.size(), options.mostBytes);
+  return {std::move(layer), tooMany};
 }
 
 }  // namespace esvr

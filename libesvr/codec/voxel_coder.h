@@ -1,9 +1,13 @@
 #pragma once
-/// Codes the voxels of a layer's bricks with a range coder. A brick may be a copy of voxels before
-/// it (brick_copies.h). In all other bricks, each voxel is predicted from the voxels before it and
-/// from its mirror image; the contexts depend on the errors of recent predictions.
+/// Codes the voxels of a layer's bricks with range coders (docs/format.md, "Voxels").
+///
+/// The bricks are divided into blocks of up to 2^20 voxels. A block has its own stream and its own
+/// models, and no voxel of it is predicted from another block, so that all threads write and read at
+/// the same time. A layer of up to 2^20 voxels in bricks is one block. The number of threads changes
+/// no byte.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -24,6 +28,31 @@ struct VoxelModel {
   std::vector<std::int32_t> common;  ///< frequent codes in decreasing order of frequency
 };
 
+/// Finds frequent codes (for floats and halves only) and, along each axis, the mirror under which
+/// the largest number of a sample's voxels are equal, if it is large enough.
+[[nodiscard]] VoxelModel chooseModel(const VoxelLayer& layer);
+[[nodiscard]] bool hasMirror(const VoxelModel& model);
+[[nodiscard]] VoxelModel withoutMirrors(VoxelModel model);
+
+/// The number of blocks that a layer is divided into. A layer with mirrors is one block, because the
+/// image of a voxel may be anywhere in it.
+[[nodiscard]] std::uint64_t blockCount(std::uint64_t bricks, const VoxelModel& model);
+
+using Stream = std::vector<std::byte>;
+using StreamView = std::span<const std::byte>;
+
+/// Writes the stream of each block.
+/// \param first  the writer of the first block, which may have written something else before
+[[nodiscard]] std::vector<Stream> encodeVoxels(Writer first, const VoxelModel& model,
+                                               const VoxelLayer& layer);
+
+/// Reads the codes and masks of a layer whose bricks are set.
+/// \param first   the reader of the first block, which may have read something else before
+/// \param others  the streams of the other blocks, blockCount() - 1 of them
+/// \throws BadInput  a code is out of range
+void decodeVoxels(const Reader& first, std::span<const StreamView> others, const VoxelModel& model,
+                  VoxelLayer& layer);
+
 /// What chooseCodes() weighs.
 struct Thrift {
   static constexpr int kMaxSteps = 2;  ///< largest distance of a code from the nearest one
@@ -39,23 +68,13 @@ struct CodedPart {
 };
 
 /// Replaces the code of a voxel that is not vacant by a code near it that takes fewer bits, if the
-/// bits saved are worth more than the error added. The layer must have the form kQuantised. Bricks
-/// are visited in the same order as by codeVoxels().
-/// \param mostBytes  the coder stops after the brick with which it has more bytes than this
-CodedPart chooseCodes(std::span<const std::size_t> order, const VoxelModel& model,
-                      const Thrift& thrift, std::uint64_t mostBytes, VoxelLayer& layer);
+/// bits saved are worth more than the error added. The layer must have the form kQuantised.
+/// \param mostBytes  the coder stops soon after it has more bytes than this
+CodedPart chooseCodes(const VoxelModel& model, const Thrift& thrift, std::uint64_t mostBytes,
+                      VoxelLayer& layer);
 
 /// The same part for the codes that the layer has.
-[[nodiscard]] CodedPart codeWithin(std::span<const std::size_t> order, const VoxelModel& model,
-                                   std::uint64_t mostBytes, const VoxelLayer& layer);
-
-/// Writes the bricks in the given order, and the voxels of a brick in the order of their offsets.
-/// A brick must come after all bricks none of whose coordinates is larger than its own.
-void codeVoxels(Writer& side, std::span<const std::size_t> order, const VoxelModel& model,
-                VoxelLayer& layer);
-/// Reads the codes and masks of a layer whose bricks are set.
-/// \throws BadInput  a code is out of range
-void codeVoxels(Reader& side, std::span<const std::size_t> order, const VoxelModel& model,
-                VoxelLayer& layer);
+[[nodiscard]] CodedPart codeWithin(const VoxelModel& model, std::uint64_t mostBytes,
+                                   const VoxelLayer& layer);
 
 }  // namespace esvr::codec

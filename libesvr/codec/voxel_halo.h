@@ -34,9 +34,10 @@ struct Halo {
 
   /// Copies the voxels that lie before brick b. The voxels of the brick itself are not set here,
   /// because the coder sets each of them before it is read.
+  /// \param index       finds bricks as BrickIndex::find
   /// \param vacantCode  code for voxels that no brick has
-  void fill(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
-            std::int32_t vacantCode) {
+  template <class Index>
+  void fill(const VoxelLayer& layer, const Index& index, std::size_t b, std::int32_t vacantCode) {
     forEachBefore(layer, index, b, [&](std::size_t at, std::uint32_t neighbour, int v) {
       const bool there = neighbour != BrickIndex::kNone;
       code[at] =
@@ -48,8 +49,8 @@ struct Halo {
   /// Calls visit(cell, neighbour, offset) for the cells of the voxels that lie before brick b.
   /// `neighbour` is the brick that has the voxel, or BrickIndex::kNone, and `offset` is the place
   /// of the voxel in its brick.
-  template <class Visit>
-  static void forEachBefore(const VoxelLayer& layer, const BrickIndex& index, std::size_t b,
+  template <class Index, class Visit>
+  static void forEachBefore(const VoxelLayer& layer, const Index& index, std::size_t b,
                             const Visit& visit) {
     for (int corner = 0; corner < 7; ++corner) {  // corner 7 is the brick itself
       const Coord step{(corner >> 2 & 1) - 1, (corner >> 1 & 1) - 1, (corner & 1) - 1};

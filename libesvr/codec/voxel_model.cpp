@@ -1,4 +1,4 @@
-#include "codec/voxel_model.h"
+#include "codec/voxel_coder.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -30,16 +30,48 @@ std::int32_t vacantCodeOf(const VoxelLayer& layer) {
   return 0;
 }
 
+using Counts = std::unordered_map<std::int32_t, std::size_t>;
+
+/// Calls visit(code) for all voxels that are not vacant.
+template <class Visit>
+void forEachCode(const VoxelLayer& layer, const Visit& visit) {
+  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
+    throwIfCancelled();
+    const auto codes = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!layer.vacant[b].test(v)) visit(codes[v]);
+  }
+}
+
+/// The codes that a sample of the voxels has often, each with a count of 0. Most voxels of a volume of
+/// floats have codes of their own, of which a table would take more time than the coder.
+Counts frequentCodes(const VoxelLayer& layer) {
+  constexpr std::size_t kSampled = 1 << 16;
+  const std::size_t every = std::max<std::size_t>(layer.codes.size() / kSampled, 1);
+  std::vector<std::int32_t> sample;
+  std::size_t seen = 0;
+  forEachCode(layer, [&](std::int32_t code) {
+    if (seen++ % every == 0) sample.push_back(code);
+  });
+  std::sort(sample.begin(), sample.end());
+  Counts frequent;
+  for (auto first = sample.begin(); first != sample.end();) {
+    const auto end = std::upper_bound(first, sample.end(), *first);
+    if (std::size_t(end - first) * 2 * kCommonShare >= sample.size()) frequent.emplace(*first, 0);
+    first = end;
+  }
+  return frequent;
+}
+
 std::vector<std::int32_t> commonCodes(const VoxelLayer& layer) {
   if (layer.form != VoxelForm::kFloat && layer.form != VoxelForm::kHalf) return {};
-  std::unordered_map<std::int32_t, std::size_t> counts;
+  Counts counts = frequentCodes(layer);
+  if (counts.empty()) return {};
   std::size_t voxels = 0;
-  for (std::size_t i = 0; i < layer.codes.size(); ++i) {
-    if (i % kBrickVoxels == 0) throwIfCancelled();
-    if (vacantAt(layer, i)) continue;
-    ++counts[layer.codes[i]];
+  forEachCode(layer, [&](std::int32_t code) {
     ++voxels;
-  }
+    if (const auto found = counts.find(code); found != counts.end()) ++found->second;
+  });
   std::vector<std::pair<std::size_t, std::int32_t>> often;
   for (const auto& [code, count] : counts)
     if (count * kCommonShare >= voxels) often.emplace_back(count, code);

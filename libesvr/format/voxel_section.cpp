@@ -7,7 +7,7 @@
 
 #include "codec/brick_order.h"
 #include "codec/cell_tree.h"
-#include "codec/voxel_model.h"
+#include "codec/voxel_coder.h"
 #include "esvr/error.h"
 
 namespace esvr::format {
@@ -88,21 +88,39 @@ BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
   return count;
 }
 
-std::vector<std::byte> encodeStream(const VoxelLayer& layer, const codec::VoxelModel& model,
-                                    int bits) {
+/// The streams of a layer. All but the last are preceded by their sizes.
+std::vector<std::byte> encodeStreams(const VoxelLayer& layer, const codec::VoxelModel& model,
+                                     int bits) {
   const auto order = codec::codingOrder(layer.bricks);
   std::vector<std::uint64_t> keys;
   for (const auto b : order) keys.push_back(codec::keyOf(layer.bricks[b]));
   codec::Writer writer;
   codec::CellTree<codec::Writer>(writer).code(keys, 3 * bits);
-  VoxelLayer written = layer;
-  codec::codeVoxels(writer, order, model, written);
-  return writer.coder.finish();
+  const auto streams = codec::encodeVoxels(std::move(writer), model, layer);
+  ByteWriter out;
+  for (std::size_t n = 0; n + 1 < streams.size(); ++n) out.put(std::uint32_t(streams[n].size()));
+  for (const auto& stream : streams) out.putAll(stream);
+  return out.take();
 }
 
-void decodeStream(ByteReader& in, const BrickCount& count, const codec::VoxelModel& model,
-                  VoxelLayer& layer) {
-  codec::Reader reader{codec::RangeDecoder(in.getBytes(in.left()))};
+std::vector<codec::StreamView> getStreams(ByteReader& in, std::uint64_t count) {
+  std::vector<std::uint32_t> sizes;
+  if (count - 1 > in.left() / sizeof(std::uint32_t))
+    in.fail("ends within the sizes of its streams");
+  for (std::uint64_t n = 0; n + 1 < count; ++n) sizes.push_back(in.get<std::uint32_t>());
+  std::vector<codec::StreamView> streams;
+  for (const std::uint32_t size : sizes) {
+    if (size > in.left()) in.fail("ends within a stream of voxels");
+    streams.push_back(in.getBytes(size));
+  }
+  streams.push_back(in.getBytes(in.left()));
+  return streams;
+}
+
+void decodeStreams(ByteReader& in, const BrickCount& count, const codec::VoxelModel& model,
+                   VoxelLayer& layer) {
+  const auto streams = getStreams(in, codec::blockCount(count.bricks, model));
+  codec::Reader reader{codec::RangeDecoder(streams.front())};
   std::vector<std::uint64_t> keys(count.bricks);
   try {
     codec::CellTree<codec::Reader>(reader).code(keys, 3 * count.bits);
@@ -110,7 +128,7 @@ void decodeStream(ByteReader& in, const BrickCount& count, const codec::VoxelMod
     layer.codes.resize(count.bricks * kBrickVoxels);
     layer.active.resize(count.bricks);
     layer.vacant.resize(count.bricks);
-    codec::codeVoxels(reader, codec::codingOrder(layer.bricks), model, layer);
+    codec::decodeVoxels(reader, std::span(streams).subspan(1), model, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }
@@ -179,10 +197,10 @@ void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
   codec::VoxelModel model = codec::chooseModel(layer);
-  auto stream = encodeStream(layer, model, bits);
+  auto stream = encodeStreams(layer, model, bits);
   if (codec::hasMirror(model)) {
     const codec::VoxelModel plain = codec::withoutMirrors(model);
-    auto other = encodeStream(layer, plain, bits);
+    auto other = encodeStreams(layer, plain, bits);
     if (other.size() < stream.size()) stream = std::move(other), model = plain;
   }
   ByteWriter out;
@@ -196,9 +214,8 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
 }
 
 bool takeMore(const VoxelLayer& layer, std::uint64_t bytes) {
-  const auto order = codec::codingOrder(layer.bricks);
   const auto takesMore = [&](const codec::VoxelModel& model) {
-    return codec::codeWithin(order, model, bytes, layer).bytes > bytes;
+    return codec::codeWithin(model, bytes, layer).bytes > bytes;
   };
   const codec::VoxelModel model = codec::chooseModel(layer);
   return takesMore(model) && (!codec::hasMirror(model) || takesMore(codec::withoutMirrors(model)));
@@ -212,7 +229,7 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
   const BrickCount count = getBrickCount(in, content.size());
   takeBricks(count.bricks, where, budget);
   const codec::VoxelModel model = getModel(in);
-  decodeStream(in, count, model, layer);
+  decodeStreams(in, count, model, layer);
   checkVoxels(layer, in);
   return layer;
 }
