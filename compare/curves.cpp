@@ -18,10 +18,10 @@ namespace {
 constexpr std::uint64_t kParts[] = {10, 20, 50, 100, 200, 400};
 
 void checkFiles(const CurvesOptions& options) {
-  const auto files = curveFiles(options.prefix, options.table.images.views > 0);
+  const auto files = curveFiles(options.prefix);
   cli::requireSeparate(inputsOf(options.table), files);
   for (const auto& file : files) {
-    cli::checkOutput(file, {".csv", ".json", ".html", ".svg", ".png"}, options.overwrite);
+    cli::checkOutput(file, {".csv", ".json", ".html"}, options.overwrite);
   }
 }
 
@@ -87,8 +87,7 @@ void curves(const CurvesOptions& options) {
   const Completion completion;  // finished rows are written after an interruption, too
   writeCurves(options.prefix, {options.table.reference, record, options.table.commandLine},
               options.overwrite);
-  for (const auto& file : curveFiles(options.prefix, options.table.images.views > 0))
-    log.info("wrote " + file.string());
+  for (const auto& file : curveFiles(options.prefix)) log.info("wrote " + file.string());
   requireAllRows(record);
 }
 

@@ -6,10 +6,8 @@
 
 #include "cli/bytes_file.h"
 #include "cli/json_file.h"
-#include "compare/curves_plots.h"
 #include "compare/curves_points.h"
 #include "report/data_table.h"
-#include "report/plot.h"
 
 namespace esvr::compare {
 namespace {
@@ -50,11 +48,9 @@ class Writer {
 
 }  // namespace
 
-std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps) {
+std::vector<std::filesystem::path> curveFiles(const std::string& prefix) {
   std::vector<std::filesystem::path> files;
-  for (const char* ending : {".csv", ".json", ".html", "-seconds.svg", "-seconds.png", "-bytes.svg",
-                             "-bytes.png", "-fps.svg", "-fps.png"})
-    if (fps || !std::string(ending).starts_with("-fps")) files.emplace_back(prefix + ending);
+  for (const char* ending : {".csv", ".json", ".html"}) files.emplace_back(prefix + ending);
   return files;
 }
 
@@ -70,10 +66,6 @@ void writeCurves(const std::string& prefix, const CurvesReport& report, bool ove
                {"peak", record.peak},
                {"interrupted", record.interrupted},
                {"points", toJson(data)}});
-  for (const auto& [ending, plot] : curvePlots(record)) {
-    writer.text(ending + ".svg", report::toSvg(plot));
-    writer.text(ending + ".png", report::toPng(plot));
-  }
   writer.text(".html", curvesPage(report));
 }
 

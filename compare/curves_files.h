@@ -10,7 +10,7 @@
 namespace esvr::compare {
 
 /// The output files, whose names begin with a prefix.
-[[nodiscard]] std::vector<std::filesystem::path> curveFiles(const std::string& prefix, bool fps);
+[[nodiscard]] std::vector<std::filesystem::path> curveFiles(const std::string& prefix);
 
 /// Writes all files. \throws RuntimeFailure  a file is not writable
 void writeCurves(const std::string& prefix, const CurvesReport& report, bool overwrite);

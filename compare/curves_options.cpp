@@ -24,12 +24,13 @@ cli::ProgramText programText() {
           ".esvr files and for VDB and ZFP files of the same sizes.",
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
-          "The program writes every point to PREFIX.csv and PREFIX.json. It writes the plots "
-          "PREFIX-bytes, PREFIX-seconds if this run makes fits, and PREFIX-fps with --fps, as .svg "
-          "and .png files. The page PREFIX.html has all of them.\n"
+          "The program writes every point to PREFIX.csv and PREFIX.json. The page PREFIX.html "
+          "has the charts: error over bytes, error over run time if this run makes fits, and "
+          "pictures per second over bytes with --fps.\n"
           "\n"
           "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the "
-          "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. PREFIX-seconds shows the "
+          "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. The chart over run time "
+          "has the "
           "time of the optimisation, and the whole time from the voxels to the file.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong "

@@ -1,13 +1,13 @@
 #include "compare/curves_page.h"
 
-#include "compare/curves_plots.h"
+#include "compare/curves_charts.h"
 #include "compare/curves_points.h"
 #include "compare/duel_tables.h"
 #include "compare/finding.h"
 #include "compare/page_order.h"
 #include "compare/report_versions.h"
 #include "compare/table_lines.h"
-#include "report/html_chart.h"
+#include "report/chart.h"
 #include "report/html_page.h"
 #include "report/html_table.h"
 
@@ -41,9 +41,9 @@ std::vector<report::Emphasis> emphasisOfFiles(const TableRecord& record) {
   return emphasis;
 }
 
-Html chartsOf(const std::vector<NamedPlot>& plots) {
+Html chartsOf(const TableRecord& record) {
   Html charts;
-  for (const auto& [ending, plot] : plots) charts += report::toHtml(plot);
+  for (const report::Chart& chart : curveCharts(record)) charts += report::toHtml(chart);
   return report::element("div", {{"class", "charts"}}, charts);
 }
 
@@ -70,7 +70,7 @@ std::string curvesPage(const CurvesReport& report) {
   files.emphasis = emphasisOfFiles(report.record);
   Html tables = report::toHtml(files);
   tables += foldedPoints(data);
-  page.sections = {report::section("", "Curves", chartsOf(curvePlots(report.record))),
+  page.sections = {report::section("", "Curves", chartsOf(report.record)),
                    duelSection(duelsOf(report.record), report.record),
                    report::section("figures", "Points", tables)};
   page.commands = versionLines();

@@ -31,6 +31,9 @@ class BitModel {
   BitModel(std::uint32_t zeros, std::uint32_t decisions)
       : state_(zeros << (kBits - 8) << kCountBits | decisions) {}
 
+  /// True before the first decision.
+  [[nodiscard]] bool isNew() const { return (state_ & kCountMask) == 0; }
+
   /// The probability of a zero in units of 1/kOne. It is neither 0 nor 1.
   [[nodiscard]] std::uint32_t zero() const { return state_ >> kCountBits; }
 

@@ -4,22 +4,16 @@
 namespace esvr {
 namespace {
 
-const CancelToken*& ownSlot() noexcept {
-  thread_local const CancelToken* token = nullptr;
-  return token;
-}
-
-CancelSlot slot = &ownSlot;  // changed once, when a module is loaded
+thread_local const CancelToken* tokenOfThread = nullptr;
 
 }  // namespace
 
-CancelSlot cancelSlot() noexcept { return slot; }
-void useCancelSlot(CancelSlot other) noexcept { slot = other; }
+CancelScope::CancelScope(const CancelToken* token) noexcept : outer_(tokenOfThread) {
+  tokenOfThread = token;
+}
+CancelScope::~CancelScope() { tokenOfThread = outer_; }
 
-CancelScope::CancelScope(const CancelToken* token) noexcept : outer_(slot()) { slot() = token; }
-CancelScope::~CancelScope() { slot() = outer_; }
-
-const CancelToken* CancelScope::token() noexcept { return slot(); }
+const CancelToken* CancelScope::token() noexcept { return tokenOfThread; }
 
 void CancelScope::check() {
   if (cancelled()) throw Cancelled();

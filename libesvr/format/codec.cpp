@@ -1,144 +1,93 @@
 #include "format/codec.h"
 
-#include <blosc.h>
-
 #include <algorithm>
-#include <limits>
-#include <stdexcept>
+#include <span>
+#include <utility>
+
+#include "codec/byte_coder.h"
+#include "esvr/error.h"
 
 namespace esvr::format {
 namespace {
 
-// Zstandard at this level gives the smallest sections among the fast settings.
-constexpr const char* kCompressor = BLOSC_ZSTD_COMPNAME;
-constexpr int kLevel = 5;
-constexpr std::size_t kBlockBytes = 256 * 1024;
+/// Bytes that compression must save. Sections lie at multiples of it, so that less saves nothing.
+constexpr std::uint64_t kMinSaving = kAlignment;
 
-/// Bytes of content in one Blosc buffer. A reader needs memory for one buffer at a time.
-constexpr std::size_t kBufferBytes = std::size_t{1} << 26;
+/// Limits on the ratio of content to stored bytes, so that a small file cannot ask a reader for much memory
+/// or time. Lists of positions reach 50; the writer adds zeros where content is compressed further. Zeros in
+/// Blosc's blocks reach half of its limit, and the writer stores raw what is above.
+constexpr std::uint64_t kMaxRatio = 1024, kMaxBloscRatio = 16384;
 
-/// Bytes that compression must save; otherwise the section is stored raw, which needs no decoder.
-constexpr std::uint64_t kMinSaving = 64;
+/// Bytes of an f32 that are stored as they are. Those of a fit are noise, and only the highest byte, which
+/// has the sign and most of the exponent, can be compressed.
+constexpr std::size_t kLowBytes = sizeof(float) - 1;
 
-constexpr int kThreads = 1;  // more threads would use Blosc's global pool
+/// Bytes on which the codec of floats is compared with that of bytes. The latter is better for numbers of
+/// few digits, which no fit makes.
+constexpr std::size_t kSample = std::size_t{1} << 16;
 
-/// The shuffle that is applied to numbers of one size before they are compressed.
-struct Filter {
-  int shuffle = BLOSC_NOSHUFFLE;
-  std::size_t typeSize = 1;
-};
-
-/// How much work compression is.
-struct Effort {
-  int level = kLevel;
-  std::size_t blockBytes = kBlockBytes;
-};
-
-std::vector<std::byte> compressed(std::span<const std::byte> raw, Filter filter, Effort effort) {
-  std::vector<std::byte> packed(raw.size() + BLOSC_MAX_OVERHEAD);
-  const int n =
-      blosc_compress_ctx(effort.level, filter.shuffle, filter.typeSize, raw.size(), raw.data(),
-                         packed.data(), packed.size(), kCompressor, effort.blockBytes, kThreads);
-  if (n <= 0) throw std::logic_error("Blosc failed to compress a buffer");
-  packed.resize(std::size_t(n));
-  return packed;
+std::vector<std::byte> codedFloats(std::span<const std::byte> raw) {
+  std::vector<std::byte> stored, high;
+  for (std::size_t i = 0; i < raw.size(); ++i)
+    (i % sizeof(float) == kLowBytes ? high : stored).push_back(raw[i]);
+  const auto coded = codec::encodeBytes(high);
+  stored.insert(stored.end(), coded.begin(), coded.end());
+  return stored;
 }
 
-/// Appends buffers of the content, of which the last one is padded.
-template <class Bytes>
-void compressTo(Bytes& all, std::span<const std::byte> raw, Filter filter, Effort effort = {}) {
-  while (!raw.empty()) {
-    const auto piece = raw.first(std::min(raw.size(), kBufferBytes));
-    std::vector<std::byte> content(piece.begin(), piece.end());
-    content.resize(paddedForBlosc(content.size()));
-    const auto buffer = compressed(content, filter, effort);
-    all.insert(all.end(), buffer.begin(), buffer.end());
-    raw = raw.subspan(piece.size());
+Packed chosen(Codec codec, std::vector<std::byte> packed, std::vector<std::byte> raw) {
+  const std::uint64_t rawBytes = raw.size();
+  if (packed.size() + kMinSaving > rawBytes) return {Codec::kRaw, std::move(raw), rawBytes};
+  return {codec, std::move(packed), rawBytes};
+}
+
+std::vector<std::byte> unpackFloats(std::span<const std::byte> stored, std::uint64_t rawBytes) {
+  const std::uint64_t count = rawBytes / sizeof(float);
+  const auto high = codec::decodeBytes(stored.subspan(count * kLowBytes), count);
+  std::vector<std::byte> raw(rawBytes);
+  for (std::uint64_t i = 0; i < count; ++i) {
+    std::ranges::copy(stored.subspan(i * kLowBytes, kLowBytes),
+                      raw.begin() + std::ptrdiff_t(i * sizeof(float)));
+    raw[i * sizeof(float) + kLowBytes] = high[i];
   }
-}
-
-std::vector<std::byte> compress(std::span<const std::byte> raw, Filter filter, Effort effort = {}) {
-  std::vector<std::byte> all;
-  compressTo(all, raw, filter, effort);
-  return all;
-}
-
-/// Shuffles bytes and shuffles bits, and returns the smaller result. Which one it is differs
-/// between streams.
-std::vector<std::byte> compressSmallest(std::span<const std::byte> raw, std::size_t typeSize) {
-  if (typeSize == 1) return compress(raw, {});
-  auto bytesShuffled = compress(raw, {BLOSC_SHUFFLE, typeSize});
-  auto bitsShuffled = compress(raw, {BLOSC_BITSHUFFLE, typeSize});
-  return bitsShuffled.size() < bytesShuffled.size() ? bitsShuffled : bytesShuffled;
-}
-
-// The bytes of a carried grid consist of numbers of a size that is not known: topology, and values of
-// 2, 4 or 8 bytes or three of them. The filter that compresses a sample best is taken.
-constexpr Filter kFilters[] = {
-    {},
-    {BLOSC_SHUFFLE, 2},
-    {BLOSC_SHUFFLE, 4},
-    {BLOSC_SHUFFLE, 8},
-    {BLOSC_SHUFFLE, 12},
-    {BLOSC_BITSHUFFLE, 2},
-    {BLOSC_BITSHUFFLE, 4},
-};
-constexpr std::size_t kSampleBytes = std::size_t{1} << 20;
-constexpr std::size_t kSamplePieces = 4;
-
-/// Content up to this size is compressed in one block at Zstandard's highest level, which takes
-/// about a second for 1 MB. It saves 4 to 5 % of the bytes of the points and vectors that were tried.
-constexpr std::size_t kLargestThorough = std::size_t{1} << 21;
-constexpr Effort kThorough{9, kLargestThorough};
-
-/// Content that represents all of it: all, or pieces at equal distances.
-std::vector<std::byte> sampleOf(std::span<const std::byte> raw) {
-  if (raw.size() <= kSampleBytes) return {raw.begin(), raw.end()};
-  constexpr std::size_t kPiece = kSampleBytes / kSamplePieces;
-  std::vector<std::byte> sample;
-  for (std::size_t p = 0; p < kSamplePieces; ++p) {
-    const auto piece = raw.subspan((raw.size() - kPiece) / (kSamplePieces - 1) * p, kPiece);
-    sample.insert(sample.end(), piece.begin(), piece.end());
-  }
-  return sample;
-}
-
-Filter bestFilter(std::span<const std::byte> raw) {
-  const auto sample = sampleOf(raw);
-  Filter best;
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (const Filter& filter : kFilters)
-    if (const std::size_t bytes = compress(sample, filter).size(); bytes < fewest)
-      best = filter, fewest = bytes;
-  return best;
-}
-
-/// True if the compressed bytes are worth their decoder.
-bool pays(std::uint64_t packedBytes, std::uint64_t rawBytes) {
-  return packedBytes + kMinSaving <= rawBytes &&
-         plausibleSizes(Codec::kBlosc, packedBytes, rawBytes);
+  return raw;
 }
 
 }  // namespace
 
-Packed pack(std::vector<std::byte> raw, std::size_t typeSize) {
-  const std::uint64_t rawBytes = raw.size();
-  auto packed = compressSmallest(raw, typeSize);
-  if (pays(packed.size(), rawBytes)) return {Codec::kBlosc, std::move(packed), rawBytes};
-  return {Codec::kRaw, std::move(raw), rawBytes};
+Packed pack(std::vector<std::byte> raw) {
+  auto packed = codec::encodeBytes(raw);
+  packed.resize(std::max<std::uint64_t>(packed.size(), raw.size() / kMaxRatio));
+  return chosen(Codec::kBytes, std::move(packed), std::move(raw));
 }
 
-PackedLarge packLarge(const VoxelArray<std::byte>& raw) {
-  const Filter filter = bestFilter(raw);
-  VoxelArray<std::byte> packed(raw.get_allocator());
-  if (raw.size() <= kLargestThorough) {
-    compressTo(packed, raw, filter, kThorough);
-    if (pays(packed.size(), raw.size())) return {Codec::kBlosc, std::move(packed)};
-    packed.clear();  // a large block of zeros exceeds the ratio that a reader accepts
+Packed packFloats(std::vector<std::byte> raw) {
+  const auto start = std::span(raw).first(std::min(raw.size(), kSample));
+  if (codec::encodeBytes(start).size() < codedFloats(start).size()) return pack(std::move(raw));
+  auto packed = codedFloats(raw);
+  return chosen(Codec::kFloats, std::move(packed), std::move(raw));
+}
+
+bool plausibleSizes(Codec codec, std::uint64_t storedBytes, std::uint64_t rawBytes) {
+  if (codec == Codec::kRaw) return storedBytes == rawBytes;
+  if (codec == Codec::kFloats)
+    return rawBytes % sizeof(float) == 0 && rawBytes / sizeof(float) * kLowBytes <= storedBytes;
+  return rawBytes / (codec == Codec::kBlosc ? kMaxBloscRatio : kMaxRatio) <= storedBytes;
+}
+
+std::vector<std::byte> unpack(Codec codec, std::vector<std::byte> stored, std::uint64_t rawBytes,
+                              const std::string& where) {
+  switch (codec) {
+    case Codec::kRaw:
+      return stored;
+    case Codec::kBytes:
+      return codec::decodeBytes(stored, rawBytes);
+    case Codec::kFloats:
+      return unpackFloats(stored, rawBytes);
+    case Codec::kBlosc:
+      break;
   }
-  compressTo(packed, raw, filter);
-  if (pays(packed.size(), raw.size())) return {Codec::kBlosc, std::move(packed)};
-  return {Codec::kRaw, raw};
+  throw BadInput(where + ": Blosc compresses the bytes of carried grids only");
 }
 
 }  // namespace esvr::format

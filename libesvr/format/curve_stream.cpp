@@ -11,7 +11,7 @@
 namespace esvr::format {
 namespace {
 
-constexpr std::size_t kPointBytes = 4 * sizeof(std::uint64_t) + sizeof(std::uint32_t);
+constexpr std::size_t kPointBytes = 28;
 
 /// A PSNR is infinite where the error is zero.
 bool valid(const CurvePoint& p) {
@@ -19,19 +19,14 @@ bool valid(const CurvePoint& p) {
 }
 constexpr const char* kInvalid = "a point of the curve is not a number";
 
-/// Calls `visit` with each member of a point, in the order of the file.
+/// Calls `visit` with each member of a point and a number of its type in the file, in the order of the file.
 template <class Visit>
 void forEachMember(Visit visit) {
-  visit(&CurvePoint::ellipsoids);
-  visit(&CurvePoint::psnrBox);
-  visit(&CurvePoint::psnrActive);
-  visit(&CurvePoint::maxError);
-  visit(&CurvePoint::iteration);
-}
-
-template <class T>
-T readAs(ByteReader& in, const T&) {
-  return in.get<T>();
+  visit(&CurvePoint::ellipsoids, std::uint64_t{});
+  visit(&CurvePoint::psnrBox, float{});
+  visit(&CurvePoint::psnrActive, float{});
+  visit(&CurvePoint::maxError, double{});
+  visit(&CurvePoint::iteration, std::uint32_t{});
 }
 
 }  // namespace
@@ -39,8 +34,8 @@ T readAs(ByteReader& in, const T&) {
 std::vector<std::byte> putCurve(std::span<const CurvePoint> curve) {
   if (!std::all_of(curve.begin(), curve.end(), valid)) throw RuntimeFailure(kInvalid);
   ByteWriter out;
-  forEachMember([&](auto member) {
-    for (const auto& point : curve) out.put(point.*member);
+  forEachMember([&](auto member, auto stored) {
+    for (const auto& point : curve) out.put(decltype(stored)(point.*member));
   });
   return out.take();
 }
@@ -49,8 +44,8 @@ std::vector<CurvePoint> getCurve(std::span<const std::byte> content, const std::
   ByteReader in(content, where);
   if (content.size() % kPointBytes != 0) in.fail("not a whole number of points");
   std::vector<CurvePoint> curve(content.size() / kPointBytes);
-  forEachMember([&](auto member) {
-    for (auto& point : curve) point.*member = readAs(in, point.*member);
+  forEachMember([&](auto member, auto stored) {
+    for (auto& point : curve) point.*member = in.get<decltype(stored)>();
   });
   if (!std::all_of(curve.begin(), curve.end(), valid)) in.fail(kInvalid);
   return curve;

@@ -39,7 +39,7 @@ CarriedGrid readCarriedGrid(SectionReader& sections, std::uint32_t number, Carri
   CarriedGrid grid = getCarried(in);
   in.finish();
   const SectionId stored{SectionKind::kCarriedBytes, number};
-  if (bytes == CarriedBytes::kAll) grid.bytes = sections.getLarge(stored);
+  if (bytes == CarriedBytes::kAll) grid.bytes = sections.getCarried(stored);
   if (bytes == CarriedBytes::kChecked) sections.check(stored);
   return grid;
 }

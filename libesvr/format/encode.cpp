@@ -33,7 +33,6 @@ namespace {
 using namespace format;
 
 constexpr std::uint16_t kOptional = 0;
-constexpr std::size_t kByteSize = 1, kFloatSize = sizeof(float), kDoubleSize = sizeof(double);
 
 /// A grid with its chunks in the order of the file, and their records.
 struct SortedGrid {
@@ -96,7 +95,7 @@ void addFileMetadata(SectionWriter& out, const EsvrFile& file) {
   if (file.metadata.empty()) return;
   ByteWriter content;
   putMetadata(content, file.metadata);
-  out.add({SectionKind::kFileMetadata}, kRequired, content.take(), kByteSize);
+  out.add({SectionKind::kFileMetadata}, kRequired, content.take());
 }
 
 std::vector<std::byte> recordOf(const SortedGrid& grid) {
@@ -106,7 +105,7 @@ std::vector<std::byte> recordOf(const SortedGrid& grid) {
 }
 
 void addGrid(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
-  out.add({SectionKind::kGrid, g}, kRequired, recordOf(grid), kByteSize);
+  out.add({SectionKind::kGrid, g}, kRequired, recordOf(grid));
 }
 
 /// Adds the chunk records of a grid with several chunks; the record of a single chunk is in the
@@ -115,12 +114,12 @@ void addChunkTable(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) 
   if (grid.records.size() < 2) return;
   ByteWriter content;
   for (const auto& record : grid.records) putChunk(content, record);
-  out.add({SectionKind::kChunks, g}, kRequired, content.take(), kFloatSize);
+  out.add({SectionKind::kChunks, g}, kRequired, content.take());
 }
 
 void addChunk(SectionWriter& out, std::uint32_t g, std::uint32_t c, const Ellipsoids& e) {
   const auto add = [&](SectionKind kind, std::span<const Plane> planes) {
-    out.add({kind, g, c}, kRequired, putPlanes(planes), kFloatSize);
+    out.addPacked({kind, g, c}, kRequired, packFloats(putPlanes(planes)));
   };
   if (e.size() == 0) return;
   add(SectionKind::kCenters, e.center);
@@ -176,7 +175,7 @@ void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> 
   else if (grid.topology == TopologyKind::kBlocks)
     out.addRaw({SectionKind::kLevels, g}, kRequired, putLevels({grid.bricks, grid.levels}));
   else if (!grid.bricks.empty())
-    out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks), kFloatSize);
+    out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks));
   if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);
   if (grid.reference)
     addRelated(out, g, grids);
@@ -184,8 +183,7 @@ void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> 
     out.addVoxels({SectionKind::kVoxels, g}, *grid.voxels);
   if (!grid.layerErrors.empty())
     out.addRaw({SectionKind::kLayerErrors, g}, kOptional, putLayerErrors(grid.layerErrors));
-  if (!grid.curve.empty())
-    out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve), kDoubleSize);
+  if (!grid.curve.empty()) out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve));
 }
 
 /// Adds the records of carried grids.
@@ -195,8 +193,7 @@ void addCarriedRecords(SectionWriter& out, const std::vector<CarriedGrid>& grids
   for (std::size_t c = 0; c < grids.size(); ++c) {
     ByteWriter content;
     putCarried(content, grids[c]);
-    out.add({SectionKind::kCarried, std::uint32_t(first + c)}, kOptional, content.take(),
-            kByteSize);
+    out.add({SectionKind::kCarried, std::uint32_t(first + c)}, kOptional, content.take());
   }
 }
 
@@ -205,7 +202,7 @@ void addCarriedBytes(SectionWriter& out, const std::vector<CarriedGrid>& grids, 
     if (grids[c].bytes.empty())
       throw RuntimeFailure("cannot store grid '" + shownName(grids[c].name) +
                            "': its bytes were not read");
-    out.addLarge({SectionKind::kCarriedBytes, std::uint32_t(first + c)}, grids[c].bytes);
+    out.addCarried({SectionKind::kCarriedBytes, std::uint32_t(first + c)}, grids[c].bytes);
   }
 }
 
@@ -234,7 +231,7 @@ using Differences = std::vector<std::optional<std::vector<std::byte>>>;
 /// Adds encoded grid records in one section.
 /// \return false if a reader would refuse so many records in so few bytes; nothing is added then
 bool addJoined(SectionWriter& out, const std::vector<std::vector<std::byte>>& records) {
-  Packed packed = pack(putRecords(records), kByteSize);
+  Packed packed = pack(putRecords(records));
   if (packed.bytes.size() < records.size()) return false;
   out.addPacked({SectionKind::kGridRecords}, kRequired, std::move(packed));
   return true;

@@ -38,7 +38,10 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kLevels, "levels"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
-constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"}, {Codec::kBlosc, "blosc"}};
+constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"},
+                                    {Codec::kBytes, "bytes"},
+                                    {Codec::kFloats, "floats"},
+                                    {Codec::kBlosc, "blosc"}};
 
 template <class Names, class Id>
 const char* find(const Names& names, Id id) {

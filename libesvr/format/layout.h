@@ -56,7 +56,9 @@ enum class SectionKind : std::uint32_t {
 
 enum class Codec : std::uint16_t {
   kRaw = 0,
-  kBlosc = 1,
+  kBytes = 1,
+  kFloats = 2,
+  kBlosc = 3,  ///< of carried bytes only
 };
 
 /// Flags of a section.

@@ -4,7 +4,7 @@
 #include <set>
 
 #include "esvr/error.h"
-#include "format/large_section.h"
+#include "format/carried_bytes.h"
 #include "format/packed_sections.h"
 #include "format/sequence_index.h"
 #include "format/table_check.h"
@@ -81,12 +81,12 @@ std::vector<std::byte> SectionReader::get(const SectionId& id) {
   return readSection(source_, table_, taken);
 }
 
-VoxelArray<std::byte> SectionReader::getLarge(const SectionId& id) {
+VoxelArray<std::byte> SectionReader::getCarried(const SectionId& id) {
   const std::size_t taken = take(id);
   const std::uint64_t bytes = table_.entries[taken].rawBytes;
   if (!budget_.voxels().isInFile(bytes))
     budget_.take(double(bytes), placeOf(source_.name(), table_, taken));
-  return readLarge(source_, table_, taken, budget_.voxels());
+  return readCarried(source_, table_, taken, budget_.voxels());
 }
 
 void SectionReader::check(const SectionId& id) { checkStored(source_, table_, take(id)); }

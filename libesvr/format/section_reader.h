@@ -44,8 +44,8 @@ class SectionReader {
   /// \throws MemoryExceeded  the content exceeds the budget
   [[nodiscard]] std::vector<std::byte> get(const SectionId& id);
 
-  /// Reads the content of a section that may be too large for the heap, like get().
-  [[nodiscard]] VoxelArray<std::byte> getLarge(const SectionId& id);
+  /// Reads the bytes of a carried grid, which may be too large for the heap, like get().
+  [[nodiscard]] VoxelArray<std::byte> getCarried(const SectionId& id);
 
   /// Checks the checksum of a section whose content is not wanted. It is called instead of get().
   /// \throws BadInput  the section is damaged or does not exist

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "format/byte_reader.h"
 #include "format/byte_writer.h"
@@ -146,6 +147,23 @@ SectionTable readTable(const ByteSource& source) {
   for (std::uint32_t i = 0; i < h.sections; ++i) table.entries.push_back(getEntry(in));
   checkTable(source.name(), table);
   return table;
+}
+
+void forEachPiece(const ByteSource& source, const SectionEntry& entry,
+                  const std::function<void(std::span<const std::byte>)>& use) {
+  constexpr std::uint64_t kPieceBytes = 1 << 20;
+  const std::uint64_t end = entry.offset + entry.storedBytes;
+  for (std::uint64_t at = entry.offset; at < end; at += std::min(kPieceBytes, end - at)) {
+    throwIfCancelled();
+    use(source.read(at, std::min(kPieceBytes, end - at)));
+  }
+}
+
+void checkStored(const ByteSource& source, const SectionTable& table, std::size_t entry) {
+  RunningChecksum sum;
+  forEachPiece(source, table.entries[entry], [&](auto piece) { sum.add(piece); });
+  if (sum.value() != table.entries[entry].checksum)
+    throw BadInput(placeOf(source.name(), table, entry) + ": checksum does not match");
 }
 
 std::vector<std::byte> readStored(const ByteSource& source, const SectionTable& table,

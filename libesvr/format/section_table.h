@@ -4,6 +4,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -67,6 +68,13 @@ struct SectionTable {
 /// possible. It reads no section.
 /// \throws BadInput
 [[nodiscard]] SectionTable readTable(const ByteSource& source);
+
+/// Passes the stored bytes of a section on in pieces, so that they need not be in memory.
+void forEachPiece(const ByteSource& source, const SectionEntry& entry,
+                  const std::function<void(std::span<const std::byte>)>& use);
+
+/// Checks the checksum of a section. \throws BadInput
+void checkStored(const ByteSource& source, const SectionTable& table, std::size_t entry);
 
 /// Reads a section as stored in the file and checks its checksum. \throws BadInput
 [[nodiscard]] std::vector<std::byte> readStored(const ByteSource& source, const SectionTable& table,

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "format/byte_writer.h"
+#include "format/carried_bytes.h"
 #include "format/checksum.h"
 #include "format/packed_sections.h"
 #include "format/voxel_section.h"
@@ -21,9 +22,8 @@ bool codedAlike(const VoxelLayer& a, const VoxelLayer& b) {
 
 }  // namespace
 
-void SectionWriter::add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content,
-                        std::size_t typeSize) {
-  addPacked(id, flags, pack(std::move(content), typeSize));
+void SectionWriter::add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content) {
+  addPacked(id, flags, pack(std::move(content)));
 }
 
 void SectionWriter::addRaw(const SectionId& id, std::uint16_t flags,
@@ -40,8 +40,8 @@ void SectionWriter::addVoxels(const SectionId& id, const VoxelLayer& layer) {
   if (before == coded_.end()) coded_.emplace_back(&layer, contentOf_.back());
 }
 
-void SectionWriter::addLarge(const SectionId& id, const VoxelArray<std::byte>& content) {
-  PackedLarge packed = packLarge(content);
+void SectionWriter::addCarried(const SectionId& id, const VoxelArray<std::byte>& content) {
+  PackedCarried packed = packCarried(content);
   SectionEntry entry{id, packed.codec, 0, 0, 0, 0, 0};
   entry.rawBytes = content.size();
   addContent(entry, {{}, std::move(packed.bytes)});

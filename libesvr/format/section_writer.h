@@ -19,9 +19,8 @@ namespace esvr::format {
 
 class SectionWriter {
  public:
-  /// Adds a section. \param typeSize  bytes of the numbers that the content is made of
-  void add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content,
-           std::size_t typeSize);
+  /// Compresses content and adds its section.
+  void add(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content);
 
   /// Adds a section whose content is coded already.
   void addRaw(const SectionId& id, std::uint16_t flags, std::vector<std::byte> content);
@@ -34,8 +33,8 @@ class SectionWriter {
   /// \param layer  must outlive the writer
   void addVoxels(const SectionId& id, const VoxelLayer& layer);
 
-  /// Adds a section of bytes that may be too large for the heap, without flags.
-  void addLarge(const SectionId& id, const VoxelArray<std::byte>& content);
+  /// Adds a section of the bytes of a carried grid, which may be too large for the heap.
+  void addCarried(const SectionId& id, const VoxelArray<std::byte>& content);
 
   /// kCompact: small sections are packed (packed_sections.h) if that makes the file smaller.
   void setLayout(FileLayout layout) { layout_ = layout; }

@@ -64,6 +64,10 @@ class TableCheck {
     if ((e.flags & ~kRequired) || e.id.frame != 0 || e.id.layer != 0)
       fail(i, "flags " + std::to_string(e.flags) + ", frame " + std::to_string(e.id.frame) +
                   ", layer " + std::to_string(e.id.layer) + version);
+    const bool isCarried = e.id.kind == SectionKind::kCarriedBytes;
+    const bool isOfCarried = e.codec == Codec::kBlosc;
+    if (e.codec != Codec::kRaw && isCarried != isOfCarried)
+      fail(i, "codec '" + nameOf(e.codec) + "' is not that of " + nameOf(e.id.kind));
     if (!plausibleSizes(e.codec, e.storedBytes, e.rawBytes))
       fail(i, std::to_string(e.storedBytes) + " bytes cannot hold " + std::to_string(e.rawBytes));
   }

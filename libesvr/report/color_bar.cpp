@@ -1,12 +1,13 @@
 #include "report/color_bar.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
 
 #include "esvr/grid_names.h"
-#include "report/axis.h"
 #include "report/cairo_surface.h"
 
 namespace esvr::report {
@@ -33,6 +34,68 @@ const Color& inkOn(const Color& background) {
   for (std::size_t i = 0; i < kWeights.size(); ++i) luma += kWeights[i] * background[i];
   return luma < 0.5 ? kLightInk : kDarkInk;
 }
+
+constexpr double kRounding = 1e-6;  // relative error of ends, which may be rounded to float32
+constexpr double kPlainFrom = 1e-3, kPlainTo = 1e6;  // numbers that need no exponent
+
+std::string tickText(double value) {
+  const double size = std::abs(value);
+  const bool plain = size == 0.0 || (size >= kPlainFrom && size < kPlainTo);
+  std::array<char, 32> text;
+  std::snprintf(text.data(), text.size(), plain ? "%.6g" : "%.0e", value);
+  return text.data();
+}
+
+int powerOf(double value) { return int(std::floor(std::log10(value) + kRounding)); }
+
+/// The labels of multiples of a step.
+class StepLabels {
+ public:
+  /// \param largest  size of the largest value
+  StepLabels(double step, double largest)
+      : plain_(step >= kPlainFrom && largest < kPlainTo),
+        digits_(plain_ ? std::max(0, -powerOf(step))
+                       : std::max(0, powerOf(largest) - powerOf(step))) {}
+
+  [[nodiscard]] std::string of(double value) const {
+    if (value == 0.0) return "0";
+    std::array<char, 64> text;
+    std::snprintf(text.data(), text.size(), plain_ ? "%.*f" : "%.*e", digits_, value);
+    return text.data();
+  }
+
+ private:
+  bool plain_;
+  int digits_;
+};
+
+/// The smallest number of the form 1, 2 or 5 times a power of ten that is not below a number, up to
+/// rounding.
+double roundUp(double value) {
+  const double power = std::pow(10.0, std::floor(std::log10(value)));
+  for (const double digit : {1.0, 2.0, 5.0})
+    if (digit * power >= value * (1.0 - kRounding)) return digit * power;
+  return 10.0 * power;
+}
+
+}  // namespace
+
+std::vector<Tick> roundTicks(double low, double high, double intervals) {
+  constexpr double kNarrowest = 1e-12;  // smallest range, relative to its values
+  const double range = high - low, largest = std::max(std::abs(low), std::abs(high));
+  if (!(range > kNarrowest * largest) || !std::isfinite(range)) return {{low, tickText(low)}};
+  const double room = kRounding * range, step = roundUp(range / intervals);
+  const double first = std::ceil((low - room) / step);
+  const StepLabels labels(step, largest);
+  std::vector<Tick> ticks;
+  for (double i = 0.0; i <= intervals && (first + i) * step <= high + room; ++i) {
+    const double value = (first + i) * step + 0.0;  // the sum turns -0 into 0
+    ticks.push_back({value, labels.of(value)});
+  }
+  return ticks;
+}
+
+namespace {
 
 /// Measures and shows texts of one size.
 class Lettering {

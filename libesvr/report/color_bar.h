@@ -9,6 +9,16 @@
 
 namespace esvr::report {
 
+struct Tick {
+  double value = 0.0;
+  std::string label;
+};
+
+/// Ticks at round numbers from `low` to `high`. The labels have as many digits as distinguish them.
+/// A range that is too narrow for that, or not finite, has one tick, at `low`.
+/// \param intervals  largest number of intervals between the ticks
+[[nodiscard]] std::vector<Tick> roundTicks(double low, double high, double intervals);
+
 /// The color of a value.
 struct Shade {
   std::array<double, 3> color{};  ///< sRGB

@@ -1,4 +1,5 @@
-'use strict';
+import './page.css';
+import './charts.js';
 
 // ---- Tables: headers sort, and a button unfolds the other figures of a row. ----
 
@@ -84,91 +85,6 @@ class SortableTable {
 for (const row of document.querySelectorAll('tr.row'))
   if (row.nextElementSibling && row.nextElementSibling.classList.contains('more')) unfoldable(row);
 for (const table of document.querySelectorAll('table.sortable')) new SortableTable(table);
-
-// ---- Charts: the point that is nearest to the pointer is read out, and so is each point that the
-// arrow keys reach. A click on a name of the legend hides the curve. ----
-
-class Chart {
-  constructor(figure) {
-    this.figure = figure;
-    this.readout = figure.querySelector('output');
-    for (const svg of figure.querySelectorAll('svg')) this.listen(svg);
-    for (const item of figure.querySelectorAll('.legend li')) this.hideable(item);
-  }
-
-  listen(svg) {
-    svg.tabIndex = 0;
-    svg.addEventListener('pointermove', event => this.show(svg, this.nearest(svg, event)));
-    svg.addEventListener('pointerdown', event => this.show(svg, this.nearest(svg, event)));
-    svg.addEventListener('pointerleave', () => this.show(svg, null));
-    svg.addEventListener('blur', () => this.show(svg, null));
-    svg.addEventListener('keydown', event => this.key(svg, event));
-  }
-
-  points(svg) { return [...svg.querySelectorAll('g:not(.off) > circle')]; }
-
-  nearest(svg, event) {
-    const box = svg.getBoundingClientRect(), scale = svg.viewBox.baseVal.width / box.width;
-    const x = (event.clientX - box.left) * scale, y = (event.clientY - box.top) * scale;
-    const reach = 60;
-    let best = null, least = reach * reach;
-    for (const point of this.points(svg)) {
-      const dx = point.cx.baseVal.value - x, dy = point.cy.baseVal.value - y;
-      if (dx * dx + dy * dy >= least) continue;
-      least = dx * dx + dy * dy;
-      best = point;
-    }
-    return best;
-  }
-
-  show(svg, point) {
-    for (const old of svg.querySelectorAll('.current')) old.classList.remove('current');
-    this.current = point;
-    this.readout.textContent = point ? point.firstElementChild.textContent : '';
-    if (!point) return;
-    point.classList.add('current');
-    const box = svg.getBoundingClientRect(), frame = this.figure.getBoundingClientRect();
-    const scale = box.width / svg.viewBox.baseVal.width;
-    const x = box.left - frame.left + point.cx.baseVal.value * scale;
-    const y = box.top - frame.top + point.cy.baseVal.value * scale;
-    const gap = 12, wide = this.readout.offsetWidth, high = this.readout.offsetHeight;
-    const left = x + gap + wide > frame.width ? x - gap - wide : x + gap;
-    this.readout.style.left = Math.max(0, left) + 'px';
-    this.readout.style.top = Math.max(0, y - gap - high) + 'px';
-  }
-
-  // Left and right go along a curve, up and down to another one.
-  key(svg, event) {
-    const curves = [...svg.querySelectorAll('g.curve:not(.off)')].filter(g => g.querySelector('circle'));
-    const along = {ArrowLeft: -1, ArrowRight: 1}[event.key];
-    const across = {ArrowUp: -1, ArrowDown: 1}[event.key];
-    if (event.key === 'Escape') return this.show(svg, null);
-    if (!curves.length || (!along && !across)) return;
-    event.preventDefault();
-    let curve = this.current ? curves.indexOf(this.current.parentNode) : 0;
-    const place = this.current ? [...this.current.parentNode.querySelectorAll('circle')].indexOf(this.current) : -1;
-    if (across && this.current) curve = (curve + across + curves.length) % curves.length;
-    const points = curves[curve].querySelectorAll('circle');
-    const next = Math.min(Math.max(place + (along || 0), 0), points.length - 1);
-    this.show(svg, points[next]);
-  }
-
-  hideable(item) {
-    const button = document.createElement('button');
-    button.type = 'button';
-    button.setAttribute('aria-pressed', 'true');
-    button.append(...item.childNodes);
-    item.append(button);
-    button.addEventListener('click', () => {
-      const off = button.getAttribute('aria-pressed') === 'true';
-      button.setAttribute('aria-pressed', String(!off));
-      for (const curve of this.figure.querySelectorAll(`g[data-curve="${item.dataset.curve}"]`))
-        curve.classList.toggle('off', off);
-    });
-  }
-}
-
-for (const figure of document.querySelectorAll('.chart')) new Chart(figure);
 
 // ---- Pictures: all show the same part. A border that moves divides two of them. ----
 

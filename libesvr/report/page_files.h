@@ -1,5 +1,5 @@
 #pragma once
-/// The style and the script of pages. The build makes them from page.css and page.js.
+/// The style and the script of pages. render/page/build.mjs bundles them.
 
 #include <string_view>
 

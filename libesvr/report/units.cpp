@@ -25,8 +25,4 @@ std::string bytesText(double bytes) {
   return plainText(bytes) + kUnits[unit];
 }
 
-std::string secondsText(double seconds) { return plainText(seconds) + " s"; }
-
-std::string percentText(double percent) { return plainText(percent) + " %"; }
-
 }  // namespace esvr::report

@@ -9,7 +9,5 @@ namespace esvr::report {
 [[nodiscard]] std::string plainText(double value);
 /// A size in units of 1000: "800 B", "46.1 KB", "2.6 MB".
 [[nodiscard]] std::string bytesText(double bytes);
-[[nodiscard]] std::string secondsText(double seconds);
-[[nodiscard]] std::string percentText(double percent);
 
 }  // namespace esvr::report

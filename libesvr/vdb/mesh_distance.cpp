@@ -12,7 +12,6 @@
 #include <optional>
 #include <vector>
 
-#include "vdb/open_vdb.h"
 #include "vdb/transform.h"
 #include "vdb/volume_to_tree.h"
 
@@ -121,14 +120,17 @@ MeshDistance directed(const Mesh& from, const Mesh& to, const openvdb::math::Tra
 }
 
 }  // namespace
+}  // namespace esvr::vdb
 
-MeshDistance OpenVdb::meshDistance(const VolumeGrid& reference, const VolumeGrid& candidate) const {
-  initializeOpenVdb();
-  const Mesh a = surfaceOf(reference), b = surfaceOf(candidate);
+namespace esvr {
+
+MeshDistance meshDistance(const VolumeGrid& reference, const VolumeGrid& candidate) {
+  vdb::initializeOpenVdb();
+  const vdb::Mesh a = vdb::surfaceOf(reference), b = vdb::surfaceOf(candidate);
   if (a.quads.empty() && b.quads.empty()) return {};
-  if (a.quads.empty() || b.quads.empty()) return kApart;
-  const auto world = toOpenVdb(reference.descriptor.transform);
-  return larger(directed(a, b, *world), directed(b, a, *world));
+  if (a.quads.empty() || b.quads.empty()) return vdb::kApart;
+  const auto world = vdb::toOpenVdb(reference.descriptor.transform);
+  return vdb::larger(vdb::directed(a, b, *world), vdb::directed(b, a, *world));
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

@@ -4,7 +4,6 @@
 #include <new>
 
 #include "vdb/make_nano.h"
-#include "vdb/open_vdb.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {
@@ -43,11 +42,15 @@ Box leavesOf(const SparseVolume& volume) {
 }
 
 }  // namespace
+}  // namespace esvr::vdb
 
-NanoVolume OpenVdb::makeNanoVolume(const VolumeGrid& grid, NanoValues values) const {
-  initializeOpenVdb();
-  const auto handle = makeNano(*asFloats(grid), {values});
-  return {values, copied(handle), bytesOf(handle), grid.volume.background, leavesOf(grid.volume)};
+namespace esvr {
+
+NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values) {
+  vdb::initializeOpenVdb();
+  const auto handle = vdb::makeNano(*vdb::asFloats(grid), {values});
+  return {values, vdb::copied(handle), vdb::bytesOf(handle), grid.volume.background,
+          vdb::leavesOf(grid.volume)};
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

@@ -12,7 +12,6 @@
 #include "vdb/errors.h"
 #include "vdb/grid_names.h"
 #include "vdb/metadata.h"
-#include "vdb/open_vdb.h"
 #include "vdb/tree_reader.h"
 
 namespace esvr::vdb {
@@ -226,24 +225,28 @@ VectorGrid readOpenVdbVector(InputFile& file, std::size_t place, const ReadOptio
   return readListedVector(archive, listGrid(archive, place), options);
 }
 
-GridSummary OpenVdb::inspectCarried(const CarriedGrid& grid) const {
-  InputFile file(std::span(grid.bytes));
-  Archive archive(file, grid);
-  GridSummary summary = listGrid(archive, 0).summary;
+}  // namespace esvr::vdb
+
+namespace esvr {
+
+GridSummary inspectCarried(const CarriedGrid& grid) {
+  vdb::InputFile file(std::span(grid.bytes));
+  vdb::Archive archive(file, grid);
+  GridSummary summary = vdb::listGrid(archive, 0).summary;
   summary.uniqueName = shownName(summary.name);
   return summary;
 }
 
-VolumeGrid OpenVdb::readGrid(const CarriedGrid& grid, const ReadOptions& options) const {
-  InputFile file(std::span(grid.bytes));
-  Archive archive(file, grid);
-  return readListedGrid(archive, listGrid(archive, 0), options);
+VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {
+  vdb::InputFile file(std::span(grid.bytes));
+  vdb::Archive archive(file, grid);
+  return vdb::readListedGrid(archive, vdb::listGrid(archive, 0), options);
 }
 
-VectorGrid OpenVdb::readVector(const CarriedGrid& grid, const ReadOptions& options) const {
-  InputFile file(std::span(grid.bytes));
-  Archive archive(file, grid);
-  return readListedVector(archive, listGrid(archive, 0), options);
+VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options) {
+  vdb::InputFile file(std::span(grid.bytes));
+  vdb::Archive archive(file, grid);
+  return vdb::readListedVector(archive, vdb::listGrid(archive, 0), options);
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "esvr/error.h"
-#include "vdb/open_vdb.h"
+#include "esvr/vdb_io.h"
 
 namespace esvr::vdb {
 namespace {
@@ -99,24 +99,28 @@ math::Transform::Ptr toOpenVdb(const Transform& transform) {
   return result;
 }
 
-Transform OpenVdb::uniformTransform(double voxelSize) const {
+}  // namespace esvr::vdb
+
+namespace esvr {
+
+Transform uniformTransform(double voxelSize) {
   if (!(voxelSize > 0.0) || !std::isfinite(voxelSize))
     throw UsageError("a voxel size must be positive and finite");
   try {
-    return fromMap(openvdb::math::UniformScaleMap(voxelSize));
+    return vdb::fromMap(openvdb::math::UniformScaleMap(voxelSize));
   } catch (const openvdb::Exception& e) {  // OpenVDB treats a scale below about 1e-5 as singular
     throw UsageError("a voxel size of " + std::to_string(voxelSize) + ": " + e.what());
   }
 }
 
-Transform OpenVdb::affineTransform(const std::array<double, 16>& matrix) const {
+Transform affineTransform(const std::array<double, 16>& matrix) {
   for (const double element : matrix)
     if (!std::isfinite(element)) throw UsageError("a transform's matrix must be finite");
   try {
-    return fromMatrix(openvdb::math::Mat4d(matrix.data()));
+    return vdb::fromMatrix(openvdb::math::Mat4d(matrix.data()));
   } catch (const openvdb::Exception& e) {
     throw UsageError(std::string("not an invertible affine transform: ") + e.what());
   }
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

@@ -1,11 +1,15 @@
+#include "esvr/vdb_io.h"
+
+#include <utility>
+
 #include "core/atomic_file.h"
 #include "core/read_input.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 #include "vdb/archive.h"
 #include "vdb/carry.h"
 #include "vdb/errors.h"
 #include "vdb/nano_file.h"
-#include "vdb/open_vdb.h"
 #include "vdb/read_nvdb.h"
 #include "vdb/read_vdb.h"
 #include "vdb/write_nvdb.h"
@@ -46,24 +50,6 @@ FileFormat formatNamedBy(const std::filesystem::path& path) {
   throw UsageError(path.string() + ": the extension must be .vdb or .nvdb");
 }
 
-}  // namespace
-
-VdbSummary OpenVdb::inspectVdb(const std::filesystem::path& path) const {
-  return readingFrom(path, [&](InputFile& file) {
-    return formatOf(file) == FileFormat::kOpenVdb ? inspectOpenVdb(file) : inspectNanoVdb(file);
-  });
-}
-
-VolumeGrid OpenVdb::readGrid(const std::filesystem::path& path, std::size_t place,
-                             const ReadOptions& options) const {
-  return readingFrom(path, [&](InputFile& file) {
-    return formatOf(file) == FileFormat::kOpenVdb ? readOpenVdbGrid(file, place, options)
-                                                  : readNanoVdbGrid(file, place, options);
-  });
-}
-
-namespace {
-
 /// Opens a file whose grids may be vectors. NanoVDB's vectors are not read.
 template <class Read>
 auto readVectors(const std::filesystem::path& path, const Read& read) {
@@ -74,38 +60,98 @@ auto readVectors(const std::filesystem::path& path, const Read& read) {
   });
 }
 
+/// Finds a grid that a user has named.
+NamedGrid namedIn(const std::filesystem::path& path, const std::string& name) {
+  std::vector<std::string> names;
+  for (const GridSummary& grid : inspectVdb(path).grids) names.push_back(grid.name);
+  return GridNames(std::move(names)).find(name, path);
+}
+
+/// The place of a grid that a user has named, of which components cannot be read.
+std::size_t placeIn(const std::filesystem::path& path, const std::string& name) {
+  const NamedGrid grid = namedIn(path, name);
+  if (grid.component)
+    throw BadInput(path.string() + ": \"" + shownName(name) +
+                   "\" is a component, which has no components of its own");
+  return grid.place;
+}
+
 }  // namespace
+}  // namespace esvr::vdb
 
-VolumeGrid OpenVdb::readComponent(const std::filesystem::path& path, std::size_t place,
-                                  std::size_t component, const ReadOptions& options) const {
-  return readVectors(
-      path, [&](InputFile& file) { return readOpenVdbComponent(file, place, component, options); });
+namespace esvr {
+
+VdbSummary inspectVdb(const std::filesystem::path& path) {
+  return vdb::readingFrom(path, [&](vdb::InputFile& file) {
+    return vdb::formatOf(file) == vdb::FileFormat::kOpenVdb ? vdb::inspectOpenVdb(file)
+                                                            : vdb::inspectNanoVdb(file);
+  });
 }
 
-VectorGrid OpenVdb::readVector(const std::filesystem::path& path, std::size_t place,
-                               const ReadOptions& options) const {
-  return readVectors(path,
-                     [&](InputFile& file) { return readOpenVdbVector(file, place, options); });
+VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
+                    const ReadOptions& options) {
+  return vdb::readingFrom(path, [&](vdb::InputFile& file) {
+    return vdb::formatOf(file) == vdb::FileFormat::kOpenVdb
+               ? vdb::readOpenVdbGrid(file, place, options)
+               : vdb::readNanoVdbGrid(file, place, options);
+  });
 }
 
-std::vector<CarriedGrid> OpenVdb::readCarried(const std::filesystem::path& path,
-                                              std::span<const std::size_t> places,
-                                              const ReadOptions& options) const {
-  return readingFrom(path,
-                     [&](InputFile& file) { return readOpenVdbCarried(file, places, options); });
+VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
+                    const ReadOptions& options) {
+  const NamedGrid grid = vdb::namedIn(path, name);
+  return grid.component ? readComponent(path, grid.place, *grid.component, options)
+                        : readGrid(path, grid.place, options);
 }
 
-void OpenVdb::writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
-                         std::span<const GridToWrite> grids, const WriteOptions& options) const {
-  const FileFormat format = formatNamedBy(path);
+VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
+                         std::size_t component, const ReadOptions& options) {
+  return vdb::readVectors(path, [&](vdb::InputFile& file) {
+    return vdb::readOpenVdbComponent(file, place, component, options);
+  });
+}
+
+VolumeGrid readComponent(const std::filesystem::path& path, const std::string& name,
+                         std::size_t component, const ReadOptions& options) {
+  return readComponent(path, vdb::placeIn(path, name), component, options);
+}
+
+VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
+                      const ReadOptions& options) {
+  return vdb::readVectors(
+      path, [&](vdb::InputFile& file) { return vdb::readOpenVdbVector(file, place, options); });
+}
+
+VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
+                      const ReadOptions& options) {
+  return readVector(path, vdb::placeIn(path, name), options);
+}
+
+std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
+                                     std::span<const std::size_t> places,
+                                     const ReadOptions& options) {
+  return vdb::readingFrom(
+      path, [&](vdb::InputFile& file) { return vdb::readOpenVdbCarried(file, places, options); });
+}
+
+void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                std::span<const VolumeGrid> grids, const WriteOptions& options) {
+  std::vector<GridToWrite> all;
+  for (const auto& grid : grids) all.emplace_back(&grid);
+  writeGrids(path, fileMetadata, all, options);
+}
+
+void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                std::span<const GridToWrite> grids, const WriteOptions& options) {
+  const vdb::FileFormat format = vdb::formatNamedBy(path);
   AtomicFile file(path, options.overwrite);
-  whileWriting(path, [&] {
-    if (format == FileFormat::kOpenVdb)
-      writeOpenVdb(file.path(), fileMetadata, grids, options);
+  vdb::whileWriting(path, [&] {
+    if (format == vdb::FileFormat::kOpenVdb)
+      vdb::writeOpenVdb(file.path(), fileMetadata, grids, options);
     else
-      writeNanoVdb(file.path(), grids, options);
+      vdb::writeNanoVdb(file.path(), grids, options);
   });
   file.commit();
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

@@ -5,13 +5,17 @@
 
 #include <string>
 
-#include "vdb/open_vdb.h"
+#include "esvr/vdb_io.h"
 
 namespace esvr::vdb {
 
 void initializeOpenVdb() { openvdb::initialize(); }
 
-std::string OpenVdb::vdbVersions() const {
+}  // namespace esvr::vdb
+
+namespace esvr {
+
+std::string vdbVersions() {
   const auto dotted = [](int major, int minor, int patch) {
     return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
   };
@@ -20,4 +24,4 @@ std::string OpenVdb::vdbVersions() const {
                 NANOVDB_PATCH_VERSION_NUMBER);
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

@@ -8,7 +8,6 @@
 #include "esvr/error.h"
 #include "vdb/errors.h"
 #include "vdb/make_nano.h"
-#include "vdb/open_vdb.h"
 #include "vdb/scalar_trees.h"
 #include "vdb/stream_archive.h"
 #include "vdb/volume_to_tree.h"
@@ -75,45 +74,64 @@ void writeNano(const openvdb::FloatGrid& source, const VoxelPacking& packing,
   nanovdb::io::writeGrid(stream, handle, nanoCodec(packing.codec));
 }
 
-class TreePacker final : public Packer {
- public:
-  explicit TreePacker(const VolumeGrid& grid)
-      : grid_(makeFloatGrid(grid)),
-        descriptor_(grid.descriptor),
-        fitsHalf_(fitsHalf(grid.volume)) {}
-
-  double write(const std::filesystem::path& path, const VoxelPacking& packing) const override {
-    checkPacking(packing, descriptor_);
-    if (packing.form == PackedForm::kOpenVdbHalf && !fitsHalf_)
-      throw UsageError("has values beyond 65504, the largest that half precision holds");
-    return whileWriting(path, [&] { return secondsOf([&] { writeForm(path, packing); }); });
-  }
-
- private:
-  void writeForm(const std::filesystem::path& path, const VoxelPacking& packing) const {
-    std::ofstream stream(path, std::ios::binary);
-    stream.exceptions(std::ios::badbit | std::ios::failbit);
-    if (isNanoVdb(packing.form))
-      writeNano(*grid_, packing, stream);
-    else
-      writeOpenVdb(*grid_, packing, stream);
-    stream.close();
-  }
-
-  openvdb::FloatGrid::Ptr grid_;
-  GridDescriptor descriptor_;
-  bool fitsHalf_;
-};
-
-}  // namespace
-
-std::unique_ptr<const Packer> OpenVdb::makePacker(const VolumeGrid& grid) const {
-  return std::make_unique<TreePacker>(grid);
+void writeForm(const openvdb::FloatGrid::Ptr& grid, const VoxelPacking& packing,
+               const std::filesystem::path& path) {
+  std::ofstream stream(path, std::ios::binary);
+  stream.exceptions(std::ios::badbit | std::ios::failbit);
+  if (isNanoVdb(packing.form))
+    writeNano(*grid, packing, stream);
+  else
+    writeOpenVdb(*grid, packing, stream);
+  stream.close();
 }
 
-double OpenVdb::secondsToRead(const std::filesystem::path& path, PackedForm form) const {
-  initializeOpenVdb();
-  return whileReading(path, [&] {
+}  // namespace
+}  // namespace esvr::vdb
+
+namespace esvr {
+
+bool isNanoVdb(PackedForm form) {
+  return form != PackedForm::kOpenVdbFloat && form != PackedForm::kOpenVdbHalf;
+}
+
+NanoValues nanoValues(PackedForm form) {
+  switch (form) {
+    case PackedForm::kNanoFp16:
+      return NanoValues::kFp16;
+    case PackedForm::kNanoFp8:
+      return NanoValues::kFp8;
+    case PackedForm::kNanoFp4:
+      return NanoValues::kFp4;
+    case PackedForm::kNanoFpN:
+      return NanoValues::kFpN;
+    default:
+      return NanoValues::kFloat;
+  }
+}
+
+/// OpenVDB's grid, and what a file of it may be.
+struct VoxelPacker::Source {
+  openvdb::FloatGrid::Ptr grid;
+  GridDescriptor descriptor;
+  bool fitsHalf;
+};
+
+VoxelPacker::VoxelPacker(const VolumeGrid& grid)
+    : source_(new Source{vdb::makeFloatGrid(grid), grid.descriptor, vdb::fitsHalf(grid.volume)}) {}
+
+VoxelPacker::~VoxelPacker() = default;
+
+double VoxelPacker::write(const std::filesystem::path& path, const VoxelPacking& packing) const {
+  vdb::checkPacking(packing, source_->descriptor);
+  if (packing.form == PackedForm::kOpenVdbHalf && !source_->fitsHalf)
+    throw UsageError("has values beyond 65504, the largest that half precision holds");
+  return vdb::whileWriting(
+      path, [&] { return secondsOf([&] { vdb::writeForm(source_->grid, packing, path); }); });
+}
+
+double secondsToRead(const std::filesystem::path& path, PackedForm form) {
+  vdb::initializeOpenVdb();
+  return vdb::whileReading(path, [&] {
     return secondsOf([&] {
       if (isNanoVdb(form)) {
         (void)nanovdb::io::readGrid(path.string());
@@ -127,4 +145,4 @@ double OpenVdb::secondsToRead(const std::filesystem::path& path, PackedForm form
   });
 }
 
-}  // namespace esvr::vdb
+}  // namespace esvr

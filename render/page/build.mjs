@@ -1,5 +1,6 @@
-// Bundles each page into one HTML file: `node build.mjs` writes dist/, `node build.mjs --check` fails
-// if dist/ is not what it would write.
+// Bundles each page into one HTML file, and the style and the script of the pages of esvr-compare:
+// `node build.mjs` writes dist/ and libesvr/report/dist/, `node build.mjs --check` fails if they are not
+// what it would write.
 import { build } from "esbuild";
 import { decoded, encoded } from "./src/local/base91.js";
 import { gunzipSync, gzipSync } from "node:zlib";
@@ -12,6 +13,9 @@ const pages = [
   { entry: "src/main-view.js", out: "dist/view.html", fill: viewPage },
   { entry: "src/main-export.js", out: "dist/export.html", fill: exportPage },
 ];
+
+/** The pages of esvr-compare, which the program writes. */
+const report = "../../libesvr/report";
 
 /** `import text from "worker:./file.js"` gives the bundled text of a worker. */
 const workers = {
@@ -41,6 +45,7 @@ function bundle(entry) {
     jsxImportSource: "preact",
     loader: { ".html": "text" },
     plugins: [workers],
+    nodePaths: [join(root, "node_modules")], // for the report, which is in another folder
     legalComments: "none",
     charset: "utf8",
     metafile: true,
@@ -111,7 +116,16 @@ async function outputs() {
     files.set(out, await fill(result));
     packagesOf(result.metafile).forEach((name) => names.add(name));
   }
-  return files.set("dist/licenses.txt", await licensesText(names));
+  files.set("dist/licenses.txt", await licensesText(names));
+  return reportFiles(files);
+}
+
+/** Adds the style and the script of reports. The licenses stand in the script, so that each page has them. */
+async function reportFiles(files) {
+  const result = await bundle(`${report}/page.js`);
+  const licenses = await Promise.all([...packagesOf(result.metafile)].sort().map(licenseOf));
+  files.set(`${report}/dist/page.css`, textOf(result, ".css"));
+  return files.set(`${report}/dist/page.js`, `/*\n${licenses.join("\n")}*/\n${textOf(result, ".js")}`);
 }
 
 async function isUpToDate(path, text) {
@@ -128,7 +142,7 @@ async function check(files) {
 }
 
 async function write(files) {
-  await mkdir(join(root, "dist"), { recursive: true });
+  for (const folder of ["dist", `${report}/dist`]) await mkdir(join(root, folder), { recursive: true });
   for (const [path, text] of files) await writeFile(join(root, path), text);
   for (const [path, text] of files) console.log(`${path}: ${Buffer.byteLength(text)} bytes`);
 }

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -22,7 +21,6 @@ using testing::HasSubstr;
 using testing::Not;
 
 constexpr const char* kDriver = "libcuda.so";
-constexpr const char* kOpenVdb = "libopenvdb.so";
 
 class Start : public test::FolderTest {
  protected:
@@ -53,32 +51,6 @@ TEST_F(Start, doesNotLookForADriverWithoutADevice) {
 TEST_F(Start, doesNotLookForADriverForHelp) {
   for (const char* program : {VDB2ESVR, ESVR2VDB, ESVR_RENDER, ESVR_VIEW, ESVR_COMPARE})
     EXPECT_THAT(librariesOf(program, {"--help"}), Not(HasSubstr(kDriver))) << program;
-}
-
-TEST_F(Start, loadsOpenVdbForVdbFilesOnly) {
-  const auto loads = HasSubstr(kOpenVdb);
-  for (const char* job : {"--list", "--check"})
-    EXPECT_THAT(librariesOf(ESVR2VDB, {job, at("in.esvr")}), Not(loads)) << job;
-  for (const char* program : {VDB2ESVR, ESVR2VDB, ESVR_RENDER, ESVR_VIEW, ESVR_COMPARE})
-    EXPECT_THAT(librariesOf(program, {"--help"}), Not(loads)) << program;
-  EXPECT_THAT(librariesOf(ESVR_RENDER, {at("in.esvr"), at("out.png"), "--size", "32x32"}),
-              Not(loads));
-  EXPECT_THAT(librariesOf(ESVR2VDB, {"--list", at("in.vdb")}), loads);
-  EXPECT_THAT(librariesOf(ESVR2VDB, {at("in.esvr"), at("back.vdb")}), loads);
-}
-
-TEST_F(Start, saysThatTheModuleOfOpenVdbCannotBeLoaded) {
-  std::ofstream(at("esvr_vdb.so")) << "This is not a library.";
-  const char* const others = std::getenv("LD_LIBRARY_PATH");
-  const std::string first = "LD_LIBRARY_PATH=" + at("") + (others ? ":" + std::string(others) : "");
-  const auto list = [&](const std::string& file) {
-    return test::runProgram("/usr/bin/env", {first, ESVR2VDB, "--list", at(file)});
-  };
-  const auto esvr = list("in.esvr"), vdb = list("in.vdb");
-  EXPECT_EQ(esvr.exitCode, 0) << esvr.err;
-  EXPECT_EQ(vdb.exitCode, 1);
-  EXPECT_THAT(vdb.err, testing::AllOf(HasSubstr("OpenVDB is needed but cannot be loaded"),
-                                      HasSubstr(at("esvr_vdb.so"))));
 }
 
 TEST_F(Start, looksForADriverOnlyIfTheBuildHasCuda) {

@@ -152,15 +152,21 @@ constexpr std::uint8_t kNoEnumerator = 200;
 const ContentLie kContentLies[] = {
     {"RequiredUnknownKind", [](CraftedFile& f) { f.add({K(kUnknownKind)}, format::kRequired, {}); },
      "must be understood"},
-    {"UnknownCodec", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec(2); }),
-     "codec 'unknown 0x2' of format 1.0, this reader knows 1.5"},
+    {"UnknownCodec", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec(4); }),
+     "codec 'unknown 0x4' of format 1.0, this reader knows 1.5"},
     {"UnknownFlag", setEntry(K::kCenters, [](Entry& e) { e.flags = 2; }), "flags 2"},
     {"LaterFrame", setEntry(K::kCenters, [](Entry& e) { e.id.frame = 1; }), "frame 1"},
     {"LaterLayer", setEntry(K::kCenters, [](Entry& e) { e.id.layer = 1; }), "layer 1"},
     {"RawSizeTooLarge", setEntry(K::kCenters, [](Entry& e) { e.rawBytes = 1ull << 60; }),
      "cannot hold"},
-    {"NotBlosc", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec::kBlosc; }),
-     "damaged Blosc buffer"},
+    {"BloscOfEllipsoids", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec::kBlosc; }),
+     "codec 'blosc' is not that of centers"},
+    {"FloatsOfABrokenSize",
+     [](CraftedFile& f) {
+       f.section(K::kGrid).entry.codec = Codec::kFloats;
+       f.section(K::kGrid).entry.rawBytes = 131;
+     },
+     "cannot hold 131"},
     {"NoGrid", without(K::kGrid), "belongs to nothing"},
     {"NoCenters", without(K::kCenters), "there is no centers of grid 0, chunk 0"},
     {"NoScales", without(K::kScales), "there is no scales"},
@@ -262,8 +268,10 @@ TEST(HostileFile, BytesBetweenTheSectionsMustBeZero) {
   CraftedFile file(plainFile());
   auto bytes = file.assemble();
   const auto& entries = file.table().entries;
-  const std::size_t gap = entries[0].offset + entries[0].storedBytes;
-  ASSERT_LT(gap, entries[1].offset);
+  const auto before = std::ranges::find_if(
+      entries, [](const Entry& e) { return e.storedBytes % format::kAlignment != 0; });
+  ASSERT_LT(before, entries.end() - 1) << "the file ends with its last section";
+  const std::size_t gap = before->offset + before->storedBytes;
   bytes[gap] = std::byte{1};
   EXPECT_THAT([&] { decode(bytes); },
               ThrowsMessage<BadInput>(HasSubstr("byte " + std::to_string(gap) + " belongs to no")));
@@ -275,7 +283,7 @@ TEST(HostileFile, AKilobyteCannotAskForAGigabyte) {
   for (const auto kind : {K::kCenters, K::kScales, K::kRotations, K::kIntensities, K::kKappas,
                           K::kBricks, K::kCurve, K::kGrid}) {
     auto& section = file.section(kind);
-    section.entry.codec = Codec::kBlosc;
+    section.entry.codec = Codec::kBytes;
     for (std::uint64_t raw = std::uint64_t{1} << 50; raw > 0; raw /= 2) {
       section.entry.rawBytes = raw;
       const auto bytes = file.assemble();
@@ -295,7 +303,7 @@ TEST(HostileFile, TheMemoryOfASmallFileIsBounded) {
   const test::AllocationMeter meter;
   EXPECT_EQ(decodeEsvr(bytes, "zeros").grids.size(), 1u);
   EXPECT_LT(meter.bytes(), 16 * kMegabyte);
-  EXPECT_LT(bytes.size(), 4096u);
+  EXPECT_LT(bytes.size(), 8192u);
 }
 
 }  // namespace

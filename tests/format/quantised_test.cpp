@@ -34,7 +34,7 @@ TEST(QuantisedFile, EncodingAgainGivesTheSameBytes) {
   EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "memory")), bytes);
 }
 
-TEST(QuantisedFile, TakesAThirdOfWhatBloscMakesOfTheFloats) {
+TEST(QuantisedFile, TakesAThirdOfTheBytesOfTheFloats) {
   EsvrFile file = quantisedFile(4000);
   const auto compact = encodeEsvr(file).size();
   file.grids[0].quantised.clear();

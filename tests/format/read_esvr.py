@@ -3,9 +3,8 @@
 
 usage: read_esvr.py FOLDER SEQUENCE.esvr
 
-Reads every golden file in the folder and the golden sequence: header, table and checksums of all,
-the content of sections that are stored raw, and compares what is known of them. Exits 1 where the
-page and a file disagree.
+Reads every golden file in the folder and the golden sequence: header, table, checksums and sections,
+and compares what is known of them. Exits 1 where the page and a file disagree.
 """
 
 import math
@@ -148,8 +147,8 @@ class Decoder:
             self.range <<= 8
             self.code = (self.code << 8 | self.next()) & 0xFFFFFFFF
 
-    def decision(self, *model):
-        p, n = self.models.get(model, (1 << 21, 0))
+    def decision(self, *model, first=(1 << 21, 0)):
+        p, n = self.models.get(model, first)
         bound = self.range * p >> 22
         one = self.code >= bound
         if one:
@@ -157,11 +156,14 @@ class Decoder:
             self.range -= bound
         else:
             self.range = bound
+        self.learn(model, one, p, n)
+        self.fill()
+        return int(one)
+
+    def learn(self, model, one, p=1 << 21, n=0):
         share = (1 << 17) // (2 * n + 3)
         p += -(p * share >> 16) if one else ((1 << 22) - 1 - p) * share >> 16
         self.models[model] = p, min(n + 1, 99)
-        self.fill()
-        return int(one)
 
     def raw(self, bits):
         value = 0
@@ -188,6 +190,38 @@ class Decoder:
             value = value << 1 | self.decision(*model, width, value)
         left = max(0, width - 4)
         return value << left | self.raw(left)
+
+
+def coded_bytes(data, count):
+    stream, out, places = Decoder(data), bytearray(), {}
+    guess = length = 0
+    while len(out) < count:
+        right = length and stream.decision("right", min(length, 15), first=(51 << 14, 1))
+        if right:
+            out.append(out[guess])
+        else:
+            before, node = out[-1] if out else 0, 1
+            for _ in range(8):
+                own = "after", before, node
+                if own in stream.models:
+                    node = node << 1 | stream.decision(*own)
+                else:
+                    bit = stream.decision("alone", node)
+                    stream.learn(own, bit)
+                    node = node << 1 | bit
+            out.append(node & 255)
+        guess, length = guess + 1, length + 1 if right else 0
+        if len(out) >= 5:
+            key = (int.from_bytes(out[-5:], "big") * 0x9E3779B97F4A7C15 & MASK) >> 48
+            if not length and key in places:
+                guess, length = places[key], 1
+            places[key] = len(out)
+    return bytes(out)
+
+
+def coded_floats(data, count):
+    low, high = data[:count // 4 * 3], coded_bytes(data[count // 4 * 3:], count // 4)
+    return b"".join(low[3 * i:3 * i + 3] + high[i:i + 1] for i in range(count // 4))
 
 
 def split(n, rank, stream):
@@ -362,9 +396,9 @@ def layer_errors(data):
 
 def curve(data):
     """A row for each point: ellipsoids, PSNR of box and active voxels, largest error, iteration."""
-    n = len(data) // 36
+    n = len(data) // 28
     r = Record(data)
-    columns = [[r.get(form) for _ in range(n)] for form in "QdddI"]
+    columns = [[r.get(form) for _ in range(n)] for form in "QffdI"]
     r.end()
     return list(zip(*columns))
 
@@ -671,14 +705,16 @@ def add(sections, minor, row):
     assert minor >= since, f"a kind of version 1.{since}"
     optional = name in ("curve", "layer errors", "carried grid", "carried bytes", "vector grid")
     assert flags == (0 if optional else 1), "flags"
-    assert codec in (0, 1) and (codec == 1 or raw == stored), "codec"
+    assert codec in (0, 1, 2, 3) and (codec or raw == stored), "codec"
+    assert codec == 0 or (codec == 3) == (name == "carried bytes"), "codec of a carried grid"
     assert (name, g, c) not in sections, "a section is there twice"
-    sections[name, g, c] = content(name, part) if codec == 0 else None
+    decode = {0: lambda data, _: data, 1: coded_bytes, 2: coded_floats}.get(codec)
+    sections[name, g, c] = content(name, decode(part, raw)) if decode else None
     return name
 
 
 def read(data):
-    """A dictionary {(kind, grid, chunk): content}; the content is None if it is compressed. That of
+    """A dictionary {(kind, grid, chunk): content}; the content is None if Blosc compressed it. That of
     a sequence index is the list of groups of frames."""
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
@@ -733,6 +769,17 @@ def check_level_set(sections):
     assert g["affine"] is None and g["kernel"] == 1 and g["active voxels"] == 4
     assert sections["bricks", 0, NONE] == [(-8, -8, 1 << 20), (-8, 0, 0), (0, -16, 8), (0, 0, -8)]
     assert ("rotations", 0, 0) not in sections
+
+
+def check_compressed(sections):
+    """Expects ellipsoids whose sections are compressed."""
+    turns = list(zip(*sections["rotations", 0, 0]))
+    assert len(turns) == len(sections["intensities", 0, 0][0]) == 60
+    assert all(abs(sum(q * q for q in turn) - 1) < 1e-5 for turn in turns)
+    low, high = (sections["grid", 0, NONE]["chunks"][0]["box"][i:i + 3] for i in (0, 3))
+    origin = sections["grid", 0, NONE]["chunks"][0]["origin"]
+    for center in zip(*sections["centers", 0, 0]):
+        assert all(a <= o + c <= b for a, o, c, b in zip(low, origin, center, high))
 
 
 def check_kappas_and_chunks(sections):
@@ -943,7 +990,7 @@ CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ell
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
           "vector_grid": check_vector_grid, "related_voxels": check_related_voxels,
-          "packed": check_packed,
+          "packed": check_packed, "compressed": check_compressed,
           "kappas_and_chunks": check_kappas_and_chunks}
 
 

@@ -53,7 +53,7 @@ check(development "include/esvr/[a-z_]+[.]h" "${library}/cmake/esvr/[A-Za-z-]+[.
       "${library}/pkgconfig/esvr[.]pc" "${library}/libesvr(_cudart_static)?[.](a|so)")
 check(programs ${binaries} ${pages} ${completions} "share/bash-completion/completions/esvr"
       "share/man/man1/esvr-compare-[a-z]+[.]1(.gz)?" "share/man/man5/esvr[.]5(.gz)?"
-      "share/zsh/(site-functions|vendor-completions)/_esvr" "${library}/esvr_vdb[.]so")
+      "share/zsh/(site-functions|vendor-completions)/_esvr")
 if(withPython)
   check(python "lib/python3/dist-packages/esvr/([a-z_]+[.]py|_core[.]pyi|py[.]typed)"
         "lib/python3/dist-packages/esvr/_core[.][a-z0-9_-]+[.]so")

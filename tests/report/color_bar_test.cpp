@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace esvr::report {
@@ -122,6 +123,36 @@ TEST(ColorBar, hasInkThatContrastsWithTheBackground) {
   };
   EXPECT_LT(darkest({1, 1, 1}).first, 0.4f);
   EXPECT_GT(darkest({0, 0, 0}).second, 0.6f);
+}
+
+using Labels = std::vector<std::string>;
+
+Labels roundLabels(double low, double high, double most) {
+  Labels texts;
+  for (const Tick& tick : roundTicks(low, high, most)) texts.push_back(tick.label);
+  return texts;
+}
+
+TEST(RoundTicks, includeTheEndsThatAreRound) {
+  EXPECT_EQ(roundLabels(0.0, 1.0, 5.0), (Labels{"0", "0.2", "0.4", "0.6", "0.8", "1.0"}));
+  EXPECT_EQ(roundLabels(-3.0, 3.0, 7.0), (Labels{"-3", "-2", "-1", "0", "1", "2", "3"}));
+  EXPECT_EQ(roundLabels(double(0.1f), double(0.3f), 4.0),
+            (Labels{"0.10", "0.15", "0.20", "0.25", "0.30"}));
+}
+
+TEST(RoundTicks, canBeDistinguishedInNarrowRanges) {
+  EXPECT_EQ(roundLabels(1000.0001, 1000.0009, 4.0),
+            (Labels{"1.0000002e+03", "1.0000004e+03", "1.0000006e+03", "1.0000008e+03"}));
+  EXPECT_EQ(roundLabels(0.0, 5e-6, 5.0),
+            (Labels{"0", "1e-06", "2e-06", "3e-06", "4e-06", "5e-06"}));
+  EXPECT_EQ(roundLabels(0.0, 3e7, 3.0), (Labels{"0", "1e+07", "2e+07", "3e+07"}));
+}
+
+TEST(RoundTicks, areThereForAnyRange) {
+  EXPECT_EQ(roundLabels(0.25, 0.25, 5.0), (Labels{"0.25"}));
+  EXPECT_EQ(roundTicks(1.0, std::nextafter(1.0, 2.0), 5.0).size(), 1u)
+      << "no room for round numbers";
+  EXPECT_EQ(roundTicks(-1.7e308, 1.7e308, 5.0).size(), 1u) << "the range is not finite";
 }
 
 }  // namespace

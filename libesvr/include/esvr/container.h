@@ -274,7 +274,7 @@ struct PartOfFile {
 /// A row of a file's section table, for --list.
 struct SectionSummary {
   std::string kind;   ///< "grid", "ellipsoids", ...; "unknown 0x...." if this reader has no name
-  std::string codec;  ///< "raw" or "blosc"
+  std::string codec;  ///< "raw", "bytes", "floats" or "blosc"
   /// Number of the section's grid, or 0xffffffff for the file. Carried grids have the numbers after
   /// those of the other grids.
   std::uint32_t grid = 0;

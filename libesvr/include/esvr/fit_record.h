@@ -23,10 +23,15 @@ struct TimedCurvePoint : CurvePoint {
   double seconds = 0.0;  ///< wall-clock time since the fit began
 };
 
-/// The points without their times, as a file stores them.
+/// The points as a file stores them: without their times, and with PSNRs that are rounded to float.
 [[nodiscard]] inline std::vector<CurvePoint> withoutTimes(
     const std::vector<TimedCurvePoint>& curve) {
-  return {curve.begin(), curve.end()};
+  std::vector<CurvePoint> points(curve.begin(), curve.end());
+  for (CurvePoint& point : points) {
+    point.psnrBox = float(point.psnrBox);
+    point.psnrActive = float(point.psnrActive);
+  }
+  return points;
 }
 
 }  // namespace esvr

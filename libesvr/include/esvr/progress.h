@@ -121,10 +121,4 @@ class BestSoFar : public Completion {
   }
 };
 
-/// Where a thread keeps its token. A module that was loaded with a copy of this library
-/// (vdb/module.cpp) uses that of its program.
-using CancelSlot = const CancelToken*& (*)() noexcept;
-[[nodiscard]] CancelSlot cancelSlot() noexcept;
-void useCancelSlot(CancelSlot slot) noexcept;
-
 }  // namespace esvr

@@ -12,10 +12,6 @@
 
 namespace esvr {
 
-namespace vdb {
-class Packer;
-}
-
 enum class PackedForm {
   kOpenVdbFloat,
   kOpenVdbHalf,
@@ -56,7 +52,8 @@ class VoxelPacker {
   double write(const std::filesystem::path& path, const VoxelPacking& packing) const;
 
  private:
-  std::unique_ptr<const vdb::Packer> packer_;
+  struct Source;
+  std::unique_ptr<const Source> source_;
 };
 
 /// Seconds that the form's own library takes to read a file's grid into memory, as OpenVDB's tree

@@ -1,17 +1,17 @@
-#include "compare/curves_plots.h"
+#include "compare/curves_charts.h"
 
 #include <algorithm>
 #include <cmath>
 #include <functional>
 
 #include "compare/curves_points.h"
-#include "compare/error_plot.h"
+#include "compare/error_chart.h"
 #include "report/units.h"
 
 namespace esvr::compare {
 namespace {
 
-using report::Plot;
+using report::Chart;
 using report::Series;
 
 /// A curve for each series of rows. \param pointOf  the point of a row
@@ -27,45 +27,39 @@ std::vector<Series> curvesOf(const TableRecord& record,
   return curves;
 }
 
-Plot overBytes(const TableRecord& record) {
-  Plot plot = errorOverBytes("Error over bytes");
-  plot.series = curvesOf(record, [](const TableRow& row) {
+Chart overBytes(const TableRecord& record) {
+  Chart chart = errorOverBytes("Error over bytes");
+  chart.series = curvesOf(record, [](const TableRow& row) {
     return errorPoint(double(*row.bytes), row.metrics->psnrBox);
   });
-  addDecibels(plot);
-  return plot;
+  return chart;
 }
 
-Plot fpsOverBytes(const TableRecord& record) {
-  Plot plot{.title = "Pictures per second over bytes",
-            .xLabel = "size of the file",
-            .yLabel = "pictures per second",
-            .logarithmicX = true,
-            .logarithmicY = true,
-            .textX = report::bytesText,
-            .textY = report::plainText};
-  plot.series = curvesOf(record, [](const TableRow& row) {
+Chart fpsOverBytes(const TableRecord& record) {
+  Chart chart{.title = "Pictures per second over bytes",
+              .x = {"size of the file", report::Unit::kBytes, true},
+              .y = {"pictures per second", report::Unit::kNone, true}};
+  chart.series = curvesOf(record, [](const TableRow& row) {
     return report::Point{double(*row.bytes), row.fps.value_or(NAN)};
   });
-  return plot;
+  return chart;
 }
 
 /// The curves of the fits, and a curve through the end-to-end times from voxels to file.
-Plot overSeconds(const TableRecord& record) {
-  Plot plot = errorOverSeconds("Error over run time");
+Chart overSeconds(const TableRecord& record) {
+  Chart chart = errorOverSeconds("Error over run time");
   Series ends{.name = "end to end", .emphasis = report::Emphasis::kOurs};
   for (const auto& row : record.rows) {
     if (row.group != kOurGroup || row.curve.empty() || !row.metrics) continue;
     Series series{.name = row.name};
     for (const auto& at : row.curve) series.points.push_back(errorPoint(at.seconds, at.psnrBox));
-    plot.series.push_back(std::move(series));
+    chart.series.push_back(std::move(series));
     if (row.fittedHere)
       ends.points.push_back(errorPoint(row.encode->median, row.metrics->psnrBox,
                                        report::bytesText(double(*row.bytes))));
   }
-  if (!ends.points.empty()) plot.series.insert(plot.series.begin(), std::move(ends));
-  addDecibels(plot);
-  return plot;
+  if (!ends.points.empty()) chart.series.insert(chart.series.begin(), std::move(ends));
+  return chart;
 }
 
 bool hasFps(const TableRecord& record) {
@@ -75,11 +69,11 @@ bool hasFps(const TableRecord& record) {
 
 }  // namespace
 
-std::vector<NamedPlot> curvePlots(const TableRecord& record) {
-  std::vector<NamedPlot> plots{{"-seconds", overSeconds(record)}, {"-bytes", overBytes(record)}};
-  if (hasFps(record)) plots.push_back({"-fps", fpsOverBytes(record)});
-  std::erase_if(plots, [](const NamedPlot& named) { return named.plot.series.empty(); });
-  return plots;
+std::vector<Chart> curveCharts(const TableRecord& record) {
+  std::vector<Chart> charts{overSeconds(record), overBytes(record)};
+  if (hasFps(record)) charts.push_back(fpsOverBytes(record));
+  std::erase_if(charts, [](const Chart& chart) { return chart.series.empty(); });
+  return charts;
 }
 
 }  // namespace esvr::compare

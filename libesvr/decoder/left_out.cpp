@@ -1,9 +1,11 @@
-// The memory of voxels in the decoder-only build, which is always the heap.
+// What the decoder-only build does without: voxels in files, and the bytes of carried grids, which need
+// Blosc and mean nothing without OpenVDB.
 
 #include <new>
 
 #include "esvr/error.h"
 #include "esvr/voxel_memory.h"
+#include "format/carried_bytes.h"
 
 namespace esvr {
 
@@ -16,5 +18,14 @@ bool VoxelMemory::isInFile(std::uint64_t) const { return false; }
 void* VoxelMemory::allocate(std::size_t bytes) const { return ::operator new(bytes); }
 
 void VoxelMemory::deallocate(void* array, std::size_t) const noexcept { ::operator delete(array); }
+
+namespace format {
+
+VoxelArray<std::byte> readCarried(const ByteSource&, const SectionTable&, std::size_t,
+                                  const VoxelMemory&) {
+  throw RuntimeFailure("this decoder has no carried grids");
+}
+
+}  // namespace format
 
 }  // namespace esvr
