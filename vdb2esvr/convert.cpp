@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include "cli/stopwatch.h"
 #include "esvr/error.h"
-#include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/psnr_between.h"
 #include "vdb2esvr/source.h"
@@ -60,13 +58,6 @@ void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
   grid.conversion = convertVolume({source.descriptor, source.volume}, wanted);
 }
 
-void countHits(const SparseVolume& source, ConvertedGrid& grid) {
-  std::vector<Coord> corners;
-  for (std::size_t b = 0; b < source.brickCount(); ++b) corners.push_back(source.brickCorner(b));
-  grid.hits = averageHits(grid.stored().field);
-  grid.voxelPairs = esvr::countHits(grid.stored().field, corners).voxelPairs;
-}
-
 /// The error of the sum between voxels, where it is meant to be drawn.
 std::optional<double> errorBetween(const SparseVolume& source, const StoredGrid& grid,
                                    const CommonFitOptions& fit) {
@@ -114,7 +105,6 @@ void measureAll(const Options& options, const VolumeGrid& source, ConvertedGrid&
   if (source.descriptor.gridClass == GridClass::kLevelSet)
     grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
   grid.psnrBetween = errorBetween(source.volume, grid.stored(), options.convert.fit);
-  if (options.countHits) countHits(source.volume, grid);
 }
 
 /// Measures a conversion. If that is cancelled, the values only.

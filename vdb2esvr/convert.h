@@ -45,14 +45,12 @@ struct ConvertedGrid {
   std::optional<double> psnrBetween;     ///< of ellipsoids that were fitted for drawing, dB
   std::size_t bricks = 0;                ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
-  InactiveValues inactive;                  ///< of the source, which the file does not hold
-  std::string device;                       ///< name of the device that fitted the grid
-  std::optional<double> hits;               ///< averageHits, with --hits
-  std::optional<std::uint64_t> voxelPairs;  ///< those of countHits in the source's bricks, --hits
-  std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
-  std::optional<SharedBytes> shared;        ///< nothing if it shares nothing
-  std::optional<NamedGrid> twinOf;          ///< id of the grid that this one is a twin of
-  std::string sameAs;                       ///< unique name of that grid
+  InactiveValues inactive;            ///< of the source, which the file does not hold
+  std::string device;                 ///< name of the device that fitted the grid
+  std::optional<PaperRecord> paper;   ///< record of the paper's method, with --paper
+  std::optional<SharedBytes> shared;  ///< nothing if it shares nothing
+  std::optional<NamedGrid> twinOf;    ///< id of the grid that this one is a twin of
+  std::string sameAs;                 ///< unique name of that grid
   PhaseSeconds seconds;
 
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }

@@ -77,10 +77,7 @@ Json fitOf(const ConvertedGrid& grid) {
           {"device_bytes", fit.deviceBytes},
           {"device_full", fit.deviceFull},
           {"chunks", fit.chunks},
-          {"kappa_learned", fit.kappaLearned},
-          {"pairs", fit.pairs},
-          {"hits", orNull(grid.hits)},
-          {"voxel_pairs", orNull(grid.voxelPairs)}};
+          {"pairs", fit.pairs}};
 }
 
 Json candidateOf(const std::optional<Candidate>& candidate) {

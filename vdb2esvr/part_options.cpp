@@ -53,8 +53,7 @@ void readParts(const cli::Arguments& a, Options& options) {
     throw UsageError("parts are fitted in several runs, which need an input file, not a pipe");
   if (isStored && options.paper) throw UsageError("fits by --paper have no parts");
   // An interrupted run is continued later. A share of the parts has no result to keep.
-  if (options.job == Job::kPart || (isStored && a.values["on-cancel"].defaulted()))
-    options.onCancel = OnCancel::kDiscard;
+  options.keepsBest = !isStored;
 }
 
 }  // namespace esvr::vdb2esvr

@@ -109,7 +109,7 @@ class FileConversion {
     }
     collectVectors(record);
     record.interrupted = cancelled();
-    if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
+    if (record.interrupted && (!options_.keepsBest || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
   }
 
@@ -411,7 +411,7 @@ int runAs(const Options& options, Ranks* ranks) {
   const cli::ThreadLimit threads(options.threads);
   cli::Interrupts interrupts(ranks ? cli::FurtherSignals::kAreIgnored
                                    : cli::FurtherSignals::kEndAtOnce);
-  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
+  if (!options.keepsBest) interrupts.discardResults();
   checkFiles(options);
   if (ranks) tellWhatSurvives(options, log);
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);

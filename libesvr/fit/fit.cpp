@@ -77,7 +77,6 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   result.field.fitFor = options.fitFor;
   if (options.start && result.field.chunks.size() == 1) result.startOf = startsOf(all, ellipsoids);
   result.range = rangeOf(volume.background, target);
-  result.kappaLearned = plan.learnKappa;
   result.end = end.end;
   result.curve = recorder.curve();
   result.wanted = plan.count;

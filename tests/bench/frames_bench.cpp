@@ -1,6 +1,6 @@
 /// Compares frames that are predicted from the frame before with files of their own.
 ///
-///     bench_frames GRID KIND PSNR STEADINESS GOP DEVICE FILE...
+///     bench_frames GRID KIND PSNR GOP DEVICE FILE...
 ///
 /// The files are those of a sequence, in its order. KIND is "voxels" or "ellipsoids", or
 /// "ellipsoids-by-value", which stores no mask of active voxels. The grid of each file is converted
@@ -45,7 +45,7 @@ Kind kindOf(const std::string& name) {
 struct Settings {
   std::string grid;
   Kind kind;
-  double psnr = 0.0, steadiness = 0.0;
+  double psnr = 0.0;
   std::size_t framesOfGroup = 1;
   Device device{};
   bool predicted = false;
@@ -93,8 +93,7 @@ class Run {
                            .representation = settings_.kind.representation,
                            .fit = {},
                            .storage = {.activity = settings_.kind.activity},
-                           .previous = previous ? &previous->grids.front() : nullptr,
-                           .steadiness = settings_.steadiness};
+                           .previous = previous ? &previous->grids.front() : nullptr};
     options.fit.device = settings_.device;
     const EsvrFile file{{}, {convertVolume({source.descriptor, source.volume}, options).grid}};
     const auto bytes = encodeFrame(file, previous);
@@ -152,14 +151,14 @@ void compare(Settings settings, const std::vector<std::string>& files) {
 }  // namespace esvr
 
 int main(int count, char** arguments) try {
-  if (count < 9) {
-    std::cerr << "usage: bench_frames GRID KIND PSNR STEADINESS GOP DEVICE FILE FILE...\n";
+  if (count < 8) {
+    std::cerr << "usage: bench_frames GRID KIND PSNR GOP DEVICE FILE FILE...\n";
     return EXIT_FAILURE;
   }
-  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[5]), 1));
-  esvr::compare({arguments[1], esvr::kindOf(arguments[2]), std::atof(arguments[3]),
-                 std::atof(arguments[4]), framesOfGroup, esvr::selectDevice(arguments[6])},
-                {arguments + 7, arguments + count});
+  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[4]), 1));
+  esvr::compare({arguments[1], esvr::kindOf(arguments[2]), std::atof(arguments[3]), framesOfGroup,
+                 esvr::selectDevice(arguments[5])},
+                {arguments + 6, arguments + count});
   return EXIT_SUCCESS;
 } catch (const esvr::Error& error) {
   std::cerr << "bench_frames: " << error.what() << "\n";

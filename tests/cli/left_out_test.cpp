@@ -142,8 +142,7 @@ TEST_F(LeftOut, saysWhyThereIsNoPlateau) {
 
 /// The voxels of the cloud take about 1570 bytes, and ellipsoids with a residual about 780 bytes.
 TEST_F(LeftOut, SlowHasTheFiguresOfAResidualAndOfTheOtherRepresentation) {
-  const Json grid =
-      gridOf(test::cloud(40), {"--max-error", "5%", "--kappa", "-6"}, {.iterations = "1000"});
+  const Json grid = gridOf(test::cloud(40), {"--max-error", "5%"}, {.iterations = "1000"});
   const Json& made = grid["representation"];
   ASSERT_EQ(made["stored"], "ellipsoids and residual");
   for (const char* part : {"residual", "representation"}) {

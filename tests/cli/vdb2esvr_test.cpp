@@ -63,8 +63,8 @@ TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
 }
 
 TEST_F(Vdb2Esvr, keepsToTheSizeAskedFor) {
-  const auto run = vdb2esvr({in(), out(), "--size", "1.5KB", "--iterations", "60", "--kappa", "0",
-                             "--representation", "ellipsoids"});
+  const auto run = vdb2esvr(
+      {in(), out(), "--size", "1.5KB", "--iterations", "60", "--representation", "ellipsoids"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_LE(std::filesystem::file_size(out()), 1500u);
   EXPECT_GE(std::filesystem::file_size(out()), 1470u);
@@ -171,8 +171,8 @@ bool storesEllipsoidsWithinABound(const std::string& in, const std::string& out,
                                   const std::vector<test::InputVoxel>& voxels,
                                   const std::string& iterations) {
   test::writeInput(in, {{.voxels = voxels}});
-  const auto run = vdb2esvr(
-      {in, out, "--max-error", "5%", "--kappa", "-6", "--iterations", iterations, "--report", "-"});
+  const auto run =
+      vdb2esvr({in, out, "--max-error", "5%", "--iterations", iterations, "--report", "-"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   const Json made = Json::parse(run.out)["grids"][0]["representation"];
   const StoredGrid grid = readEsvr(out).grids[0];

@@ -188,7 +188,6 @@ class ChunkedFit {
         exportField(all, {volume.origin, scene_.scale.scale, volume.background, kernel_});
     result.field.fitFor = options_.fitFor;
     result.range = rangeOf(volume.background, scene_.scale);
-    result.kappaLearned = !options_.kappa;
     result.end = endAt(result.curve.back().psnrBox);
     result.wanted = plannedCount(options_, activeVoxels_);
     result.chunks = scene_.chunks.size();

@@ -101,7 +101,6 @@ struct FitResult {
   std::vector<std::uint32_t> startOf{};
   std::vector<TimedCurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
-  bool kappaLearned = false;  ///< true if kappa was fitted, false if it was given
   /// Wall-clock times. secondsSeed covers the seeding at the start, growth and relocation, and is
   /// not part of secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;
