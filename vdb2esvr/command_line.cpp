@@ -7,7 +7,6 @@
 #include "esvr/convert.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/paper_options.h"
-#include "vdb2esvr/part_options.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -198,6 +197,9 @@ void addFileOptions(cli::po::options_description& options) {
      "background of the grid or by that number")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
+    ("resume", bool_switch(),
+     "keep the finished parts of a fit in chunks in the folder OUT.esvr.parts until OUT.esvr is "
+     "written, or the finished frames of a sequence, and continue from those that are there")
     ("progress", value<std::string>()->value_name("P")->default_value("text"),
      "text: a bar on a terminal, and lines in a log with --verbose; json: lines of JSON on stderr")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
@@ -215,7 +217,6 @@ cli::CommandLine commandLine() {
   addFileOptions(line.options());
   cli::addSequenceOptions(line.options());
   addFitOptions(line.options());
-  addPartOptions(line.options());
   cli::addHostMemory(line);
   line.mainOptions({"preset", "size", "ratio", "psnr", "max-error", "lossless", "count", "grid",
                     "keep", "skip", "force", "report", "frames", "resume", "device", "max-vram"});

@@ -53,7 +53,7 @@ void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
   wanted.previous = wish.previous;
   if (wish.bytes) wanted.goal = SizeGoal{*wish.bytes};
   // The parts of a single fit do not depend on the storage, and compact storage takes time.
-  if (options.job == Job::kPart && std::holds_alternative<FitGoal>(wanted.goal))
+  if (options.onlyFits && std::holds_alternative<FitGoal>(wanted.goal))
     wanted.storage.form = Storage::kFloat32;
   grid.conversion = convertVolume({source.descriptor, source.volume}, wanted);
 }
@@ -138,7 +138,7 @@ ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
-  if (options.job == Job::kPart) return grid;
+  if (options.onlyFits) return grid;
 
   measure(options, source, grid);
   grid.seconds.measure = watch.lap();

@@ -56,7 +56,7 @@ struct ConvertedGrid {
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
 };
 
-/// Reads, converts and measures a grid. A run with Job::kPart does not measure it.
+/// Reads, converts and measures a grid. A process that only fits does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
 /// \param expected  a grid that is like this one and that its voxels are to refer to; null: the same
 ///                  grid of the previous frame, if there is one

@@ -1,6 +1,7 @@
 #include "vdb2esvr/options.h"
 
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 
 #include "cli/box_option.h"
@@ -14,8 +15,6 @@
 #include "cli/table.h"
 #include "vdb2esvr/command_line.h"
 #include "vdb2esvr/paper_options.h"
-#include "vdb2esvr/part_options.h"
-#include "vdb2esvr/refuse_with.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -26,6 +25,14 @@ using cli::requireRange;
 constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kLongestRun = 1e9;  // seconds
 constexpr double kLargestRatio = 1e9;
+
+/// \throws UsageError  one of the options was given, which `given` excludes
+void refuseWith(const Arguments& a, const std::string& given,
+                std::initializer_list<const char*> options) {
+  for (const char* option : options)
+    if (a.has(option) && !a.values[option].defaulted())
+      throw UsageError("--" + given + " cannot be combined with --" + option);
+}
 
 /// An option's number, which must be within [low, high], converted to another type.
 template <class To, class From>
@@ -194,20 +201,22 @@ void readMemory(const Arguments& a, Options& options) {
   options.convert.fit.maxHostBytes = memory.maxBytes / kFitsShare;
 }
 
+void readResume(const Arguments& a, Options& options) {
+  options.resume = a.get<bool>("resume");
+  if (!options.resume) return;
+  if (!options.inputs.piped.empty())
+    throw UsageError("--resume continues in another run, which needs an input file, not a pipe");
+  if (options.paper) throw UsageError("fits by --paper have no parts for --resume");
+}
+
 /// Reads the options of a sequence after the goal, --resume and --force.
 void readFrames(const Arguments& a, Options& options) {
   options.sequence = cli::readSequence(a, {.output = true});
   if (!options.sequence) return;
-  for (const char* option : {"part", "merge"})
-    if (a.has(option) && !a.values[option].defaulted())
-      throw UsageError("--" + std::string(option) +
-                       " is for one volume; give each job some frames of the sequence (--frames)");
   if (options.resume && a.get<bool>("force"))
     throw UsageError(
         "--resume keeps the frames that are there, and --force replaces them; choose one");
   if (auto* goal = std::get_if<PresetGoal>(&options.convert.goal)) goal->steady = true;
-  // A frame that ended early would look as if it were complete.
-  options.keepsBest = false;
 }
 
 }  // namespace
@@ -236,7 +245,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readNonFinite(a, options.read);
   readMemory(a, options);
   options.device = cli::deviceOf(a);
-  readParts(a, options);
+  readResume(a, options);
   readFrames(a, options);
   options.report = a.find<std::string>("report").value_or("");
   options.progress = progressForm(a);

@@ -10,7 +10,6 @@
 #include "cli/sequence.h"
 #include "esvr/container.h"
 #include "esvr/convert.h"
-#include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/grid_goals.h"
@@ -19,10 +18,6 @@
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
-/// What a run does of a conversion: all of it; the share of one process in the fits; or all but the
-/// fits, from the parts that other processes have fitted.
-enum class Job { kWhole, kPart, kMerge };
-
 struct Options {
   std::filesystem::path input, output;
   cli::InputFiles inputs;
@@ -42,16 +37,18 @@ struct Options {
   std::optional<PaperMethod> paper;   ///< the paper's method, if it replaces ours
   ReadOptions read;
   std::string device = "auto";
-  Job job = Job::kWhole;
   bool resume = false;    ///< parts are kept in a folder until the file is written
-  PartShare share;        ///< for Job::kPart
-  bool keepsBest = true;  ///< an interrupted run writes its best state
+  bool onlyFits = false;  ///< the process is a rank of MPI above 0, which writes no file
   std::string report;     ///< file name, or cli::kStandardOutput; empty: no report
   bool overwrite = false;
   ProgressForm progress = ProgressForm::kText;
   int threads = 0;  ///< number of threads; 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
+
+  /// True if an interrupted run writes its best state. A run that is continued later keeps its
+  /// finished parts, and a frame that ended early would look as if it were complete.
+  [[nodiscard]] bool keepsBest() const { return !resume && !sequence; }
 };
 
 /// \return nothing if --help or --version was printed
