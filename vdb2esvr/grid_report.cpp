@@ -5,7 +5,6 @@
 #include "cli/stability_json.h"
 #include "esvr/grid_names.h"
 #include "vdb2esvr/json_values.h"
-#include "vdb2esvr/left_out_report.h"
 #include "vdb2esvr/paper_report.h"
 #include "vdb2esvr/scene_notes.h"
 
@@ -186,6 +185,19 @@ Json stabilityOf(const StoredGrid& grid) {
   return json;
 }
 
+/// The parts that the file does without. A figure that is not known has no key.
+Json leftOutOf(const RunRecord& record, std::size_t g) {
+  Json list = Json::array();
+  for (const LeftOut& note : leftOut(record, g)) {
+    Json entry{{"part", note.part}, {"why", note.why}, {"used", note.used}};
+    if (note.bytesWith) entry["bytes_with"] = *note.bytesWith;
+    if (note.bytesWithout) entry["bytes_without"] = *note.bytesWithout;
+    if (note.seconds) entry["seconds"] = *note.seconds;
+    list.push_back(entry);
+  }
+  return list;
+}
+
 }  // namespace
 
 Json gridJson(const RunRecord& record, std::size_t g) {
@@ -209,7 +221,7 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"metrics", metricsJson(grid.metrics, grid.psnrBetween)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsJson(grid.seconds)},
-          {"left_out", leftOutJson(leftOut(record, g))},
+          {"left_out", leftOutOf(record, g)},
           {"curve", curveOf(grid.conversion.fit.curve)}};
 }
 
