@@ -1,8 +1,6 @@
 #include "vdb2esvr/grid_report.h"
 
-#include "cli/grid_stability.h"
 #include "cli/names.h"
-#include "cli/stability_json.h"
 #include "esvr/grid_names.h"
 #include "vdb2esvr/json_values.h"
 #include "vdb2esvr/paper_report.h"
@@ -174,17 +172,6 @@ Json sharedOf(const ConvertedGrid& grid) {
           {"seconds", shared.seconds}};
 }
 
-/// The evaluation of a grid's ellipsoids; null if it has none.
-Json stabilityOf(const StoredGrid& grid) {
-  constexpr std::size_t kSamples = 32;
-  if (grid.field.ellipsoidCount() == 0) return nullptr;
-  const Stability stability = measureStability(grid.field, cli::stabilityOptionsOf(grid, kSamples));
-  Json json{{"correct_digits", correctDigits(stability.largest, cli::peakOfSource(grid))}};
-  json.update(cli::differencesJson(stability));
-  json.update(cli::difficultiesJson(stability));
-  return json;
-}
-
 /// The parts that the file does without. A figure that is not known has no key.
 Json leftOutOf(const RunRecord& record, std::size_t g) {
   Json list = Json::array();
@@ -217,7 +204,6 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"compact", compactOf(grid)},
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
-          {"stability", stabilityOf(grid.stored())},
           {"metrics", metricsJson(grid.metrics, grid.psnrBetween)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsJson(grid.seconds)},

@@ -125,7 +125,6 @@ INSTANTIATE_TEST_SUITE_P(
             "curves",
             ESVR_COMPARE,
             {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}},
-        ProgramCommand{"stability", ESVR_COMPARE, {"stability", "DIR/in.esvr", "--device", "cpu"}},
         ProgramCommand{
             "image2vdb",
             IMAGE2VDB,

@@ -233,19 +233,6 @@ Table curvesTests() {
           {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}};
 }
 
-Table stabilityTests() {
-  return {
-      {"--bricks", "CompareStability.comparesAsManyBricksAsAsked"},
-      {"--device", "CompareStabilityOnGpu.measuresBothDevices"},
-      {"--force", "CompareStability.replacesAReportWhereForced"},
-      {"--frames", "CompareStability.measuresTheFramesOfASequence"},
-      {"--grid", "CompareStability.listsGridsThatHaveNoEllipsoids"},
-      {"--max-difference", "CompareStability.failsBeyondTheLimitAndNamesTheFirstDigitThatIsLost"},
-      {"--max-memory", "CompareStability.refusesWhatHasNoEllipsoidsAndWhatIsTooLarge"},
-      {"--report", "CompareStability.replacesAReportWhereForced"},
-      {"--scratch", "CompareStability.refusesWhatHasNoEllipsoidsAndWhatIsTooLarge"}};
-}
-
 Table image2vdbTests() {
   return {{"--background", "Image2Vdb.bringsInVtiWithABackground"},
           {"--component", "Image2Vdb.bringsInAComponentThatIsChosen"},
@@ -270,7 +257,6 @@ std::vector<Program> programs() {
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
           {"curves", ESVR_COMPARE, "curves", curvesTests()},
-          {"stability", ESVR_COMPARE, "stability", stabilityTests()},
           {"image2vdb", IMAGE2VDB, "", image2vdbTests()}};
 }
 

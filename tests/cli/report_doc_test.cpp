@@ -236,20 +236,6 @@ TEST_F(ComparisonDoc, namesTheKeysOfATable) {
     expectNamed(all_["rows"][object], row.at(object), object);
 }
 
-TEST_F(ComparisonDoc, namesTheKeysOfStability) {
-  add(ESVR_COMPARE, {"stability", at("in.esvr"), "--device", "cpu"});
-  const Table report = tableAfter(document_, "The report of `stability`");
-  expectTable(all_, report, {"grids"}, "stability");
-  const Table objects = tableAfter(document_, "The objects of a grid in the report of `stability`");
-  Keys keys = namedIn(report.at("grids"));
-  keys.merge(keysOf(objects));
-  EXPECT_EQ(keysOf(all_["grids"]), without(keys, kNoKeys));
-  for (const char* object : {"difficulties", "devices"})
-    expectNamed(all_["grids"][object], objects.at(object), object);
-  expectNamed(all_["grids"]["devices"]["worst"], "`brick`, `voxel`, `max_difference`, `bound`",
-              "worst");
-}
-
 TEST_F(ComparisonDoc, namesTheKeysOfCurves) {
   const auto run =
       test::runProgram(ESVR_COMPARE, {"curves", at("in.vdb"), at("in.esvr"), "--output", at("c"),
