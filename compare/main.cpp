@@ -8,7 +8,6 @@
 #include "compare/check.h"
 #include "compare/curves.h"
 #include "compare/program.h"
-#include "compare/stability.h"
 #include "compare/table.h"
 
 namespace {
@@ -19,16 +18,15 @@ using namespace esvr::compare;
 esvr::cli::CommandLine overview() {
   esvr::cli::CommandLine line(
       {.name = kProgram,
-       .purpose = "Compares grids with a reference, and their evaluation with its definition.",
+       .purpose = "Compares grids with a reference.",
        .usage =
            "  esvr-compare check REF CAND              fail if a grid differs too much\n"
            "  esvr-compare table REF [CAND.esvr ...]   compare with other ways to store the "
            "volume\n"
-           "  esvr-compare curves REF [CAND.esvr ...]  plot error over run time and over bytes\n"
-           "  esvr-compare stability FILE.esvr         fail if float32 is not precise enough",
+           "  esvr-compare curves REF [CAND.esvr ...]  plot error over run time and over bytes",
        .notes = "esvr-compare COMMAND --help describes each command.",
        .examples = "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45"});
-  line.argument("command", "COMMAND: check, table, curves or stability");
+  line.argument("command", "COMMAND: check, table or curves");
   return line;
 }
 
@@ -46,14 +44,9 @@ void run(int argc, const char* const* argv) {
     if (const auto options = parseCurvesOptions(argc - 1, argv + 1)) curves(*options);
     return;
   }
-  if (command == "stability") {
-    if (const auto request = parseStabilityOptions(argc - 1, argv + 1)) stability(*request);
-    return;
-  }
   if (!command.empty() && command.front() != '-')
     throw esvr::UsageError("unknown command '" + std::string(command) +
-                           "'; the commands are check, table, curves and "
-                           "stability");
+                           "'; the commands are check, table and curves");
   (void)overview().parse(argc, argv);
 }
 

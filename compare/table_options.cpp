@@ -31,6 +31,13 @@ cli::ProgramText programText() {
           "  esvr-compare table REF.vdb [CAND.esvr ...] [--size 50KB]... [--external X]...\n"
           "  esvr-compare table REF.vdb --row SETTING",
       .notes =
+          "The ratio is the size of the half-float Blosc VDB of the same grid divided by the size "
+          "of the row. Times are medians of --runs runs after a warm-up run. Memory is the larger "
+          "of what encoding and decoding allocate.\n"
+          "\n"
+          "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong "
+          "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
+      .details =
           "For each CAND and each --size, the program searches for the best file of each baseline "
           "that is not larger. For VDB files, voxels near the background are dropped, empty leaves "
           "are removed, and the other voxels are quantised. The search varies the threshold until "
@@ -46,14 +53,9 @@ cli::ProgramText programText() {
           "units of the values; the program searches for the largest one that suits. PACKED may "
           "have any form; its size is that of the row.\n"
           "\n"
-          "The ratio is the size of the half-float Blosc VDB of the same grid divided by the size "
-          "of the row. Times are medians of --runs runs after a warm-up run. Encoding goes from "
-          "OpenVDB's tree (ZFP: from an array) to the file. Decoding goes from the file to "
-          "OpenVDB's tree, NanoVDB's buffer, an array (ZFP) or a sparse volume (.esvr). Memory is "
-          "the larger of what encoding and decoding allocate.\n"
-          "\n"
-          "Exit codes: 0 done, 1 failure or interrupted (finished rows are printed), 2 wrong "
-          "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
+          "Encoding goes from OpenVDB's tree (ZFP: from an array) to the file. Decoding goes from "
+          "the file to OpenVDB's tree, NanoVDB's buffer, an array (ZFP) or a sparse volume "
+          "(.esvr).",
       .examples =
           "  esvr-compare table smoke.vdb smoke.esvr\n"
           "  esvr-compare table smoke.vdb smoke.esvr --html page.html --markdown table.md\n"
@@ -87,7 +89,7 @@ cli::CommandLine makeCommandLine() {
      "raw file if :NXxNYxNZ:TYPE follows; then any of :encode=S, :decode=S, :fps=N; may be "
      "repeated")
     ("external-command", value<Words>()->value_name("X")->composing(),
-     "add rows for a compressor that a command runs, at each size and PSNR: NAME=COMMAND; see below; "
+     "add rows for a compressor that a command runs, at each size and PSNR: NAME=COMMAND; "
      "may be repeated")
     ("runs", value<int>()->value_name("N")->default_value(TableOptions{}.runs),
      "number of runs; times are their medians")
@@ -108,6 +110,8 @@ cli::CommandLine makeCommandLine() {
   // clang-format on
   addSceneOptions(line);
   addReportOptions(line.options());
+  line.mainOptions({"rows", "size", "psnr", "psnr-active", "fit", "grid", "box", "images", "colors",
+                    "runs", "device", "report", "markdown", "csv", "html", "force"});
   return line;
 }
 

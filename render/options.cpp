@@ -30,6 +30,10 @@ cli::CommandLine commandLine() {
   addMeasuringOptions(line.options());
   line.options().add_options()("force,f", bool_switch(), "replace OUT.png if it exists");
   cli::addHostMemory(line);
+  line.mainOptions({"grid", "colors",     "opacity",    "tf",     "range",     "opacity-length",
+                    "with", "resolution", "background", "legend", "mode",      "shade",
+                    "clip", "camera",     "eye",        "center", "turntable", "frames",
+                    "fps",  "device",     "ref",        "bench",  "force"});
   return line;
 }
 

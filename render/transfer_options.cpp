@@ -46,7 +46,7 @@ void addTransferOptions(cli::po::options_description& options) {
      "length in voxels over which a constant value has the opacity of the curve; a larger length "
      "makes the volume more transparent")
     ("with", value<Texts>()->composing()->value_name("NAME[:LOOK]"),
-     "also draw this grid in the same picture, see the notes; can be repeated");
+     "also draw this grid in the same picture, see --help expert; can be repeated");
   // clang-format on
 }
 

@@ -68,11 +68,6 @@ Json goalsOf(const std::vector<GridGoal>& goals) {
   return list;
 }
 
-Json shareOf(const WantedSharing& sharing) {
-  if (!sharing.names.empty()) return sharing.names;
-  return sharing.isOn ? "auto" : "off";
-}
-
 }  // namespace
 
 Json askedJson(const Options& options) {
@@ -87,15 +82,13 @@ Json askedJson(const Options& options) {
           {"max_error_is_share", isShare(options.convert.goal)},
           {"representation", nameOf(options.convert.representation)},
           {"goals", goalsOf(options.gridGoals)},
-          {"share", shareOf(options.sharing)},
+          {"share", options.shares ? "auto" : "off"},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
           {"method", options.paper ? "paper" : "default"},
           {"preset", nameOf(fit.preset)},
-          {"kappa", orNull(fit.kappa)},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
           {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
-          {"storage_loss", storage.loss},
           {"topology", nameOf(storage.activity)},
           {"keep", options.grids.keep},
           {"skip", options.grids.skip},

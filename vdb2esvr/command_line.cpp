@@ -2,12 +2,11 @@
 
 #include "cli/device_option.h"
 #include "cli/host_memory.h"
+#include "cli/sequence.h"
 #include "cli/table.h"
 #include "esvr/convert.h"
-#include "vdb2esvr/frame_options.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/paper_options.h"
-#include "vdb2esvr/part_options.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -25,69 +24,80 @@ cli::ProgramText programText() {
           "source, and voxels have the chosen accuracy.",
       .usage =
           "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
-          "  vdb2esvr IN.####.vdb OUT.####.esvr [--frames 1-100x2] ...\n"
-          "  vdb2esvr IN.####.vdb OUT.esvr [--frames 1-100x2] [--gop N] ...",
+          "  vdb2esvr IN.####.vdb OUT.####.esvr|OUT.esvr [--frames 1-100x2] ...",
       .notes =
+          "Without a goal, each grid gets the quality of --preset in as few bytes as were found. "
+          "For each grid, the program chooses between ellipsoids and quantised voxels. With "
+          "--count there is a single fit.\n"
+          "\n"
+          "Without -g, all grids are converted. Grids that cannot be fitted, such as integers, "
+          "masks "
+          "and points, come back bit for bit.\n"
+          "\n"
+          "The program prints a table on stdout. Its PSNR and largest error are measured on the "
+          "voxels that are decoded from the written file. Ctrl-C ends the run within two seconds "
+          "and writes the best result so far. OUT.esvr is never incomplete.\n"
+          "\n"
+          "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. If OUT has "
+          "one, each frame of a sequence is converted to a file of its own; otherwise OUT.esvr "
+          "holds all frames.\n"
+          "\n"
+          "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input, 4 "
+          "--psnr not reached (the file is written), 5 no such device or not enough memory "
+          "(--max-memory, --max-vram).",
+      .details =
           "IN.vdb may be - for standard input, or a pipe such as <(...). Its bytes are copied to a "
           "file in the folder of --scratch, which has no name. If an input changes while it is "
           "read, the run fails.\n"
           "\n"
-          "Without -g, all grids are converted. Grids of vectors are fitted by components, unless "
-          "they take fewer bytes unchanged. Grids that are not fitted come back bit for bit: those "
-          "that are not of floats, doubles or vectors of them (integers, masks, strings, points), "
-          "those without an active voxel, and those that --keep names are carried in the file as "
-          "the bytes that OpenVDB wrote. --skip leaves grids out, and the summary says what was "
-          "fitted, carried and left out. A grid of a .nvdb file cannot be carried; a file with one "
-          "that cannot be fitted either is refused, unless --skip names it.\n"
+          "Grids of vectors are fitted by components, unless they take fewer bytes unchanged. "
+          "Grids that are not fitted are carried in the file as the bytes that OpenVDB wrote: "
+          "those "
+          "that are not of floats, doubles or vectors of them, those without an active voxel, and "
+          "those that --keep names. The summary says what was fitted, carried and left out. A grid "
+          "of a .nvdb file cannot be carried; a file with one that cannot be fitted either is "
+          "refused, unless --skip names it.\n"
           "\n"
-          "Without a goal, each grid gets the quality of --preset in as few bytes as were found; a "
-          "grid of more than 33 million voxels in bricks gets a single fit instead. --size and "
-          "--ratio search for the best file that is not larger. Several grids share the bytes in "
-          "proportion to their active voxels, after each got a few hundred, and the bytes of "
-          "carried grids count. A frame of a sequence without active voxels has no size. --psnr "
-          "searches for the smallest file that reaches the PSNR; --count then limits the number of "
-          "ellipsoids. In all these cases, the program chooses for each grid between ellipsoids "
-          "and quantised voxels. It makes only a short fit if that shows that voxels are better. "
+          "Without a goal, a grid of more than 33 million voxels in bricks gets a single fit. With "
+          "--size and --ratio, several grids share the bytes in proportion to their active voxels, "
+          "after each got a few hundred, and the bytes of carried grids count. A frame of a "
+          "sequence without active voxels has no size. With --psnr, --count limits the number of "
+          "ellipsoids. The program makes only a short fit if that shows that voxels are better. "
           "Grids of more than 33 million voxels are stored as ellipsoids or exact voxels. "
           "--representation prescribes one of them.\n"
           "\n"
-          "With --count, --seconds, --iterations or --storage-loss there is a single fit. Its "
-          "ellipsoids are stored unless exact voxels take no more bytes. With --psnr and "
-          "--seconds, it ends as soon as it reaches the PSNR.\n"
+          "With --count, --seconds or --iterations there is a single fit. Its ellipsoids are "
+          "stored "
+          "unless exact voxels take no more bytes. With --psnr and --seconds, it ends as soon as "
+          "it "
+          "reaches the PSNR.\n"
           "\n"
           "Grids with the same voxels are converted and stored once. The voxels of other grids of "
           "one transform refer to each other where that takes fewer bytes, such as those of a "
           "temperature to a density, and small parts of the file are stored together (--share).\n"
           "\n"
-          "The program prints a table on stdout. Its PSNR and largest error are measured on the "
-          "voxels that are decoded from the written file.\n"
+          "Ctrl-C and SIGTERM end the run within two seconds, and the exit code is 1. A message "
+          "says so if completing the best result so far takes longer. A second Ctrl-C ends the "
+          "program at once. With --resume, nothing but the finished parts is kept, and the same "
+          "command continues the run.\n"
           "\n"
-          "Ctrl-C and SIGTERM end the run within two seconds, and the exit code is 1. --on-cancel "
-          "chooses whether the best result so far is written; a message says so if completing it "
-          "takes longer. A second Ctrl-C ends the program at once. OUT.esvr is never "
-          "incomplete. With --resume, the same command continues a run that was interrupted.\n"
+          "A file with all frames of a sequence has groups of 16 frames. A frame whose grids "
+          "differ "
+          "from those of the frame before it begins a group. Until the file is complete, it has "
+          "the "
+          "name OUT.esvr.partial. Without a goal, all frames have the PSNR of --preset, whatever "
+          "their size. A file of one frame does not depend on other frames. In OUT, only the name "
+          "of the file may have a pattern; folders stand for themselves.\n"
           "\n"
-          "If OUT has a pattern, each frame of a sequence is converted as a file of its own, which "
-          "does not depend on other frames. Otherwise, OUT.esvr holds all frames, in groups of "
-          "--gop frames. A frame whose grids differ from those of the frame before it begins a "
-          "group. Until the file is complete, it has the name OUT.esvr.partial. Without a goal, "
-          "all frames have the PSNR of --preset, whatever their size.\n"
-          "\n"
-          "In a pattern, #, #### and %04d are four digits, and @ is as many as needed. In OUT, "
-          "only "
-          "the name of the file may have one; folders stand for themselves. Frames are converted "
-          "at the same time on the threads of --threads, or up to four on each GPU of "
-          "--device, as far as --max-memory allows. A frame that fails is named, and does not stop "
-          "the others (--on-error stop); the exit code is that of the first one. Ctrl-C keeps the "
-          "frames that are complete, or the groups that are complete in one file. With --resume, "
-          "they are not converted again.\n"
+          "Frames are converted at the same time on the threads of --threads, or up to four on "
+          "each "
+          "GPU of --device, as far as --max-memory allows. A frame that fails is named, and does "
+          "not stop the others (--on-error stop); the exit code is that of the first one. Ctrl-C "
+          "keeps the frames that are complete, or the groups that are complete in one file. With "
+          "--resume, they are not converted again.\n"
           "\n"
           "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program was "
-          "built with MPI. All devices and processes together write the bytes that one writes.\n"
-          "\n"
-          "Exit codes: 0 done, 1 failure or interrupted, 2 wrong options, 3 unusable input, 4 "
-          "--psnr not reached (the file is written), 5 no such device or not enough memory "
-          "(--max-memory, --max-vram).",
+          "built with MPI. All devices and processes together write the bytes that one writes.",
       .examples =
           "  vdb2esvr smoke.vdb smoke.esvr                       # a small file of good quality\n"
           "  vdb2esvr smoke.vdb smoke.esvr --size 100KB          # the best file of 100 KB\n"
@@ -130,7 +140,6 @@ void addGoalOptions(cli::po::options_description& options) {
 }
 
 void addFitOptions(cli::po::options_description& options) {
-  const double defaultLoss = CompactOptions::kDefaultLoss;
   // clang-format off
   options.add_options()
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
@@ -138,8 +147,6 @@ void addFitOptions(cli::po::options_description& options) {
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
      "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
      "over the active voxels; in a single fit, the count and the iterations that are not given")
-    ("kappa", value<float>()->value_name("K"),
-     "edge of the kernel (default: it is fitted with the ellipsoids)")
     ("box", value<std::string>()->value_name("BOX"),
      "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is measured (default: the bounding box of "
      "the active voxels)")
@@ -147,10 +154,6 @@ void addFitOptions(cli::po::options_description& options) {
      "seed of the random choices; the same seed gives the same file")
     ("storage", value<std::string>()->value_name("S")->default_value("compact"),
      "compact (quantised, 7 to 12 bytes per ellipsoid) or float32 (about 34)")
-    ("storage-loss",
-     value<double>()->value_name("DB")->default_value(defaultLoss, cli::shortNumber(defaultLoss)),
-     "PSNR that --storage compact may lose in a single fit; --size, --psnr and --max-error ignore "
-     "this option")
     ("paper", value<std::vector<std::string>>()->value_name("KEY=VALUE,...")->composing(),
      "fit by the paper's method, for comparison; --help paper lists the keys");
   // clang-format on
@@ -179,18 +182,17 @@ void addFileOptions(cli::po::options_description& options) {
     ("share", value<std::string>()->value_name("W")->default_value("auto"),
      "auto: grids of one transform refer to each other where that makes the file smaller, and small "
      "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
-     "--ratio; or the names of the grids that may share, as density,temperature")
+     "--ratio")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; zero, background or a number: replace them by 0, by the "
      "background of the grid or by that number")
-    ("on-cancel", value<std::string>()->value_name("W")->default_value("keep"),
-     "keep or discard the best result so far if the run is interrupted (with --resume: discard, "
-     "because the finished parts are kept)")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
+    ("resume", bool_switch(),
+     "keep the finished parts of a fit in chunks in the folder OUT.esvr.parts until OUT.esvr is "
+     "written, or the finished frames of a sequence, and continue from those that are there")
     ("progress", value<std::string>()->value_name("P")->default_value("text"),
      "text: a bar on a terminal, and lines in a log with --verbose; json: lines of JSON on stderr")
-    ("hits", bool_switch(), "report the average number of ellipsoids that reach a voxel")
     ("force,f", bool_switch(), "replace OUT.esvr and the report if they exist");
   // clang-format on
 }
@@ -202,12 +204,13 @@ cli::CommandLine commandLine() {
   line.argument("input", "IN.vdb");
   line.volumeInputs({"input"});
   line.argument("output", "OUT.esvr");
-  addFileOptions(line.options());
-  addFrameOptions(line.options());
   addGoalOptions(line.options());
+  addFileOptions(line.options());
+  cli::addSequenceOptions(line.options());
   addFitOptions(line.options());
-  addPartOptions(line.options());
   cli::addHostMemory(line);
+  line.mainOptions({"preset", "size", "ratio", "psnr", "max-error", "lossless", "count", "grid",
+                    "keep", "skip", "force", "report", "frames", "resume", "device", "max-vram"});
   line.helpTopic("paper", paperHelp());
   return line;
 }

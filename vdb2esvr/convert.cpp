@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <utility>
 #include <variant>
-#include <vector>
 
 #include "cli/stopwatch.h"
 #include "esvr/error.h"
-#include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "vdb2esvr/source.h"
 
@@ -54,16 +52,11 @@ void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
   wanted.previous = wish.previous;
   if (wish.bytes) wanted.goal = SizeGoal{*wish.bytes};
   // The parts of a single fit do not depend on the storage, and compact storage takes time.
-  if (options.job == Job::kPart && std::holds_alternative<FitGoal>(wanted.goal))
+  if (options.onlyFits && std::holds_alternative<FitGoal>(wanted.goal))
     wanted.storage.form = Storage::kFloat32;
   grid.conversion = convertVolume({source.descriptor, source.volume}, wanted);
 }
 
-void countHits(const SparseVolume& source, ConvertedGrid& grid) {
-  std::vector<Coord> corners;
-  for (std::size_t b = 0; b < source.brickCount(); ++b) corners.push_back(source.brickCorner(b));
-  grid.hits = averageHits(grid.stored().field);
-  grid.voxelPairs = esvr::countHits(grid.stored().field, corners).voxelPairs;
 }
 
 /// Largest number of voxels in bricks up to which the meshes of a level set are compared without
@@ -101,7 +94,6 @@ void measureAll(const Options& options, const VolumeGrid& source, ConvertedGrid&
   grid.surface = surfaceErrors(source, decoded);
   if (source.descriptor.gridClass == GridClass::kLevelSet)
     grid.whyNoNarrowBand = whyNoNarrowBand(source.descriptor, source.volume);
-  if (options.countHits) countHits(source.volume, grid);
 }
 
 /// Measures a conversion. If that is cancelled, the values only.
@@ -135,7 +127,7 @@ ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();
-  if (options.job == Job::kPart) return grid;
+  if (options.onlyFits) return grid;
 
   measure(options, source, grid);
   grid.seconds.measure = watch.lap();

@@ -44,20 +44,18 @@ struct ConvertedGrid {
   std::string whyNoNarrowBand;           ///< of a level set that is none (whyNoNarrowBand())
   std::size_t bricks = 0;                ///< bricks of the source
   std::uint64_t nonFiniteReplaced = 0;
-  InactiveValues inactive;                  ///< of the source, which the file does not hold
-  std::string device;                       ///< name of the device that fitted the grid
-  std::optional<double> hits;               ///< averageHits, with --hits
-  std::optional<std::uint64_t> voxelPairs;  ///< those of countHits in the source's bricks, --hits
-  std::optional<PaperRecord> paper;         ///< record of the paper's method, with --paper
-  std::optional<SharedBytes> shared;        ///< nothing if it shares nothing
-  std::optional<NamedGrid> twinOf;          ///< id of the grid that this one is a twin of
-  std::string sameAs;                       ///< unique name of that grid
+  InactiveValues inactive;            ///< of the source, which the file does not hold
+  std::string device;                 ///< name of the device that fitted the grid
+  std::optional<PaperRecord> paper;   ///< record of the paper's method, with --paper
+  std::optional<SharedBytes> shared;  ///< nothing if it shares nothing
+  std::optional<NamedGrid> twinOf;    ///< id of the grid that this one is a twin of
+  std::string sameAs;                 ///< unique name of that grid
   PhaseSeconds seconds;
 
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
 };
 
-/// Reads, converts and measures a grid. A run with Job::kPart does not measure it.
+/// Reads, converts and measures a grid. A process that only fits does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
 /// \param expected  a grid that is like this one and that its voxels are to refer to; null: the same
 ///                  grid of the previous frame, if there is one

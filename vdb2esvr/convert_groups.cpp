@@ -118,7 +118,7 @@ class FileOfGroups {
                const CancelToken& cancel)
       : options_(options),
         cancel_(cancel),
-        groups_(planGroups(frames, options.groupFrames)),
+        groups_(planGroups(frames)),
         conversion_(options, frames, cancel),
         writer_(options.output, {options.overwrite, partialOf(options)}) {
     keepGroups(frames);

@@ -82,8 +82,6 @@ void resolveNames(const VdbSummary& input, Options& options) {
     if (!withGoals.insert(own.place).second)
       throw UsageError("grid \"" + names.unique(own.place) + "\" has two goals");
   }
-  for (const std::string& name : options.sharing.names)
-    options.sharing.places.insert(names.findWhole(name, options.input));
 }
 
 std::optional<std::size_t> ownGoalOf(const Options& options, const FittedGrid& grid) {

@@ -1,11 +1,8 @@
 #include "vdb2esvr/grid_report.h"
 
-#include "cli/grid_stability.h"
 #include "cli/names.h"
-#include "cli/stability_json.h"
 #include "esvr/grid_names.h"
 #include "vdb2esvr/json_values.h"
-#include "vdb2esvr/left_out_report.h"
 #include "vdb2esvr/paper_report.h"
 #include "vdb2esvr/scene_notes.h"
 
@@ -77,10 +74,7 @@ Json fitOf(const ConvertedGrid& grid) {
           {"device_bytes", fit.deviceBytes},
           {"device_full", fit.deviceFull},
           {"chunks", fit.chunks},
-          {"kappa_learned", fit.kappaLearned},
-          {"pairs", fit.pairs},
-          {"hits", orNull(grid.hits)},
-          {"voxel_pairs", orNull(grid.voxelPairs)}};
+          {"pairs", fit.pairs}};
 }
 
 Json candidateOf(const std::optional<Candidate>& candidate) {
@@ -178,15 +172,17 @@ Json sharedOf(const ConvertedGrid& grid) {
           {"seconds", shared.seconds}};
 }
 
-/// The evaluation of a grid's ellipsoids; null if it has none.
-Json stabilityOf(const StoredGrid& grid) {
-  constexpr std::size_t kSamples = 32;
-  if (grid.field.ellipsoidCount() == 0) return nullptr;
-  const Stability stability = measureStability(grid.field, cli::stabilityOptionsOf(grid, kSamples));
-  Json json{{"correct_digits", correctDigits(stability.largest, cli::peakOfSource(grid))}};
-  json.update(cli::differencesJson(stability));
-  json.update(cli::difficultiesJson(stability));
-  return json;
+/// The parts that the file does without. A figure that is not known has no key.
+Json leftOutOf(const RunRecord& record, std::size_t g) {
+  Json list = Json::array();
+  for (const LeftOut& note : leftOut(record, g)) {
+    Json entry{{"part", note.part}, {"why", note.why}, {"used", note.used}};
+    if (note.bytesWith) entry["bytes_with"] = *note.bytesWith;
+    if (note.bytesWithout) entry["bytes_without"] = *note.bytesWithout;
+    if (note.seconds) entry["seconds"] = *note.seconds;
+    list.push_back(entry);
+  }
+  return list;
 }
 
 }  // namespace
@@ -208,11 +204,10 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"compact", compactOf(grid)},
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
-          {"stability", stabilityOf(grid.stored())},
           {"metrics", metricsJson(grid.metrics)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsJson(grid.seconds)},
-          {"left_out", leftOutJson(leftOut(record, g))},
+          {"left_out", leftOutOf(record, g)},
           {"curve", curveOf(grid.conversion.fit.curve)}};
 }
 

@@ -35,12 +35,13 @@ bool hasAll(const std::vector<cli::Frame>& frames, const PlannedGroup& group,
 
 }  // namespace
 
-std::vector<PlannedGroup> planGroups(const std::vector<cli::Frame>& frames, std::size_t size) {
+std::vector<PlannedGroup> planGroups(const std::vector<cli::Frame>& frames) {
   std::vector<PlannedGroup> groups;
-  std::size_t withInput = size;  // frames with an input in the last group; no frame is held by it
+  std::size_t withInput =
+      kGroupFrames;  // frames with an input in the last group; no frame is held by it
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].missing && !frames[i].holds) continue;
-    if (!frames[i].holds && withInput++ == size) groups.emplace_back(), withInput = 1;
+    if (!frames[i].holds && withInput++ == kGroupFrames) groups.emplace_back(), withInput = 1;
     groups.back().push_back(i);
   }
   return groups;

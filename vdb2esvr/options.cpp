@@ -1,6 +1,7 @@
 #include "vdb2esvr/options.h"
 
 #include <cmath>
+#include <initializer_list>
 #include <limits>
 
 #include "cli/box_option.h"
@@ -10,12 +11,10 @@
 #include "cli/error_bound.h"
 #include "cli/host_memory.h"
 #include "cli/number.h"
+#include "cli/sequence.h"
 #include "cli/table.h"
 #include "vdb2esvr/command_line.h"
-#include "vdb2esvr/frame_options.h"
 #include "vdb2esvr/paper_options.h"
-#include "vdb2esvr/part_options.h"
-#include "vdb2esvr/refuse_with.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -26,8 +25,14 @@ using cli::requireRange;
 constexpr std::int64_t kMaxIterations = 10'000'000;
 constexpr double kLongestRun = 1e9;  // seconds
 constexpr double kLargestRatio = 1e9;
-constexpr double kMaxLoss = 20.0;      // dB
-constexpr float kLargestKappa = 1e4f;  // kernel.h
+
+/// \throws UsageError  one of the options was given, which `given` excludes
+void refuseWith(const Arguments& a, const std::string& given,
+                std::initializer_list<const char*> options) {
+  for (const char* option : options)
+    if (a.has(option) && !a.values[option].defaulted())
+      throw UsageError("--" + given + " cannot be combined with --" + option);
+}
 
 /// An option's number, which must be within [low, high], converted to another type.
 template <class To, class From>
@@ -56,7 +61,6 @@ FitOptions fitOptions(const Arguments& a) {
     fit.maxDeviceBytes = std::size_t(cli::parseDeviceMemory("max-vram", *memory));
   fit.chunkVoxels = bounded<std::uint64_t>(a, "chunk-voxels", std::int64_t{1},
                                            std::numeric_limits<std::int64_t>::max());
-  fit.kappa = bounded<float>(a, "kappa", -kLargestKappa, kLargestKappa);
   if (const auto box = a.find<std::string>("box")) fit.box = cli::parseBox(*box);
   fit.seed =
       *bounded<std::uint64_t>(a, "seed", std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
@@ -75,9 +79,7 @@ Activity activity(const Arguments& a) {
 }
 
 StorageOptions storageOptions(const Arguments& a) {
-  return {.form = storage(a),
-          .loss = *bounded<double>(a, "storage-loss", 0.0, kMaxLoss),
-          .activity = activity(a)};
+  return {.form = storage(a), .activity = activity(a)};
 }
 
 Representation representation(const Arguments& a) {
@@ -102,13 +104,12 @@ Goal boundGoal(const Arguments& a, const Options& options) {
 void requireGridGoals(const Arguments& a, const Options& options) {
   if (options.gridGoals.empty()) return;
   refuseWith(a, "psnr NAME=DB and --max-error NAME=E",
-             {"count", "seconds", "iterations", "storage-loss", "size", "ratio", "paper"});
+             {"count", "seconds", "iterations", "size", "ratio", "paper"});
 }
 
 /// True if an option was given that determines a single fit.
 bool isSingleFit(const Arguments& a) {
-  return a.has("count") || a.has("seconds") || a.has("iterations") || a.has("paper") ||
-         !a.values["storage-loss"].defaulted();
+  return a.has("count") || a.has("seconds") || a.has("iterations") || a.has("paper");
 }
 
 /// The goal of each grid; a size replaces it later.
@@ -137,9 +138,8 @@ void readSize(const Arguments& a, Options& options) {
 void readPaper(const Arguments& a, Options& options) {
   const auto given = a.find<std::vector<std::string>>("paper");
   if (!given) return;
-  refuseWith(a, "paper", {"kappa", "iterations", "preset", "chunk-voxels"});
+  refuseWith(a, "paper", {"iterations", "preset", "chunk-voxels"});
   options.paper = readPaperMethod(*given);
-  options.paper->countHits = a.get<bool>("hits");
   StorageOptions& storage = options.convert.storage;
   if (a.values["storage"].defaulted()) storage.form = Storage::kFloat32;
   if (options.paper->learnK && storage.form == Storage::kCompact)
@@ -157,8 +157,8 @@ void requireRepresentation(const Arguments& a, const Options& options) {
   if (wanted != Representation::kVoxels) return;
   if (std::holds_alternative<FitGoal>(options.convert.goal) && !sized)
     throw UsageError(
-        "--representation voxels cannot be combined with --count, --seconds, --iterations, "
-        "--storage-loss or --paper");
+        "--representation voxels cannot be combined with --count, --seconds, --iterations or "
+        "--paper");
   if (options.convert.storage.form == Storage::kFloat32)
     throw UsageError("--representation voxels cannot be combined with --storage float32");
 }
@@ -181,18 +181,6 @@ ProgressForm progressForm(const Arguments& a) {
                                    {{"text", ProgressForm::kText}, {"json", ProgressForm::kJson}});
 }
 
-OnCancel onCancel(const Arguments& a) {
-  return cli::choose<OnCancel>("on-cancel", a.get<std::string>("on-cancel"),
-                               {{"keep", OnCancel::kKeep}, {"discard", OnCancel::kDiscard}});
-}
-
-WantedSharing sharing(const Arguments& a) {
-  const auto given = a.get<std::string>("share");
-  if (given != "auto" && given != "off") refuseWith(a, "share " + given, {"size", "ratio"});
-  if (given == "auto" || given == "off") return {.isOn = given == "auto", .names = {}};
-  return {.isOn = true, .names = cli::splitText(given, ',')};
-}
-
 void readMemory(const Arguments& a, Options& options) {
   constexpr std::uint64_t kVolumes = 3;    // the source, its codes and what they decode to
   constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
@@ -201,6 +189,24 @@ void readMemory(const Arguments& a, Options& options) {
   options.read.memory = memory.voxels;
   options.read.volumes = kVolumes;
   options.convert.fit.maxHostBytes = memory.maxBytes / kFitsShare;
+}
+
+void readResume(const Arguments& a, Options& options) {
+  options.resume = a.get<bool>("resume");
+  if (!options.resume) return;
+  if (!options.inputs.piped.empty())
+    throw UsageError("--resume continues in another run, which needs an input file, not a pipe");
+  if (options.paper) throw UsageError("fits by --paper have no parts for --resume");
+}
+
+/// Reads the options of a sequence after the goal, --resume and --force.
+void readFrames(const Arguments& a, Options& options) {
+  options.sequence = cli::readSequence(a, {.output = true});
+  if (!options.sequence) return;
+  if (options.resume && a.get<bool>("force"))
+    throw UsageError(
+        "--resume keeps the frames that are there, and --force replaces them; choose one");
+  if (auto* goal = std::get_if<PresetGoal>(&options.convert.goal)) goal->steady = true;
 }
 
 }  // namespace
@@ -214,7 +220,8 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.output = a.get<std::string>("output");
   options.inputs = a.inputs;
   options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip"), false};
-  options.sharing = sharing(a);
+  options.shares =
+      cli::choose<bool>("share", a.get<std::string>("share"), {{"auto", true}, {"off", false}});
   readGridGoals(a, options);
   options.convert.fit = fitOptions(a);
   options.convert.fit.psnr = options.psnr;
@@ -228,12 +235,10 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readNonFinite(a, options.read);
   readMemory(a, options);
   options.device = cli::deviceOf(a);
-  options.onCancel = onCancel(a);
-  readParts(a, options);
+  readResume(a, options);
   readFrames(a, options);
   options.report = a.find<std::string>("report").value_or("");
   options.progress = progressForm(a);
-  options.countHits = a.get<bool>("hits");
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;
   options.verbosity = a.verbosity;

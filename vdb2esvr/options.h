@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -11,7 +10,6 @@
 #include "cli/sequence.h"
 #include "esvr/container.h"
 #include "esvr/convert.h"
-#include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/grid_goals.h"
@@ -20,34 +18,16 @@
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
-inline constexpr std::size_t kUsualGroupFrames = 16;  ///< of a group in a file for all frames
-
-/// What a run does of a conversion: all of it; the share of one process in the fits; or all but the
-/// fits, from the parts that other processes have fitted.
-enum class Job { kWhole, kPart, kMerge };
-
-/// Whether an interrupted run writes its best state.
-enum class OnCancel { kKeep, kDiscard };
-
-/// Which grids of a file may share what they have in common.
-struct WantedSharing {
-  bool isOn = true;
-  std::vector<std::string> names;  ///< empty: all grids
-  std::set<std::size_t> places{};  ///< of the named grids in the input (resolveNames)
-};
-
 struct Options {
   std::filesystem::path input, output;
   cli::InputFiles inputs;
   /// The frames, if the input is a pattern. The output is a pattern, too, or one file for all
   /// frames.
   std::optional<cli::Sequence> sequence;
-  std::size_t groupFrames =
-      kUsualGroupFrames;  ///< largest number of frames in a group of a file for all frames
   /// For a frame of a group: the frame before it as a reader gets it; null for the first one.
   const EsvrFile* previous = nullptr;
   WantedGrids grids;
-  WantedSharing sharing;
+  bool shares = true;                 ///< grids of a file share what they have in common
   ConvertOptions convert;             ///< options of every grid; a size replaces the goal
   std::vector<GridGoal> gridGoals;    ///< goals of single grids instead of that in `convert`
   std::optional<double> psnr;         ///< PSNR that all other grids should reach, dB over the box
@@ -57,17 +37,18 @@ struct Options {
   std::optional<PaperMethod> paper;   ///< the paper's method, if it replaces ours
   ReadOptions read;
   std::string device = "auto";
-  Job job = Job::kWhole;
-  bool resume = false;  ///< parts are kept in a folder until the file is written
-  PartShare share;      ///< for Job::kPart
-  OnCancel onCancel = OnCancel::kKeep;
-  std::string report;      ///< file name, or cli::kStandardOutput; empty: no report
-  bool countHits = false;  ///< whether the report has the average ellipsoid hits
+  bool resume = false;    ///< parts are kept in a folder until the file is written
+  bool onlyFits = false;  ///< the process is a rank of MPI above 0, which writes no file
+  std::string report;     ///< file name, or cli::kStandardOutput; empty: no report
   bool overwrite = false;
   ProgressForm progress = ProgressForm::kText;
   int threads = 0;  ///< number of threads; 0: all
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
+
+  /// True if an interrupted run writes its best state. A run that is continued later keeps its
+  /// finished parts, and a frame that ended early would look as if it were complete.
+  [[nodiscard]] bool keepsBest() const { return !resume && !sequence; }
 };
 
 /// \return nothing if --help or --version was printed

@@ -23,9 +23,6 @@ const char* nameOf(PruneScore score) {
   return "full";
 }
 
-/// The average hits, or null if they were not counted (with --hits, they are above 0).
-Json orNull(double hits) { return hits > 0.0 ? Json(hits) : Json(nullptr); }
-
 Json ratesOf(const PaperRates& rates) {
   return {{"position", rates.position},
           {"scale", rates.scale},
@@ -56,7 +53,7 @@ Json prunesOf(const PaperRecord& record) {
                       {"after", pass.after},
                       {"psnr_box_before", pass.psnrBoxBefore},
                       {"psnr_box_after", pass.psnrBoxAfter},
-                      {"hits_before", orNull(pass.hitsBefore)}});
+                      {"hits_before", pass.hitsBefore}});
   return passes;
 }
 
@@ -75,7 +72,8 @@ Json paperJson(const PaperRecord& record) {
           {"rates", ratesOf(m.rates)},
           {"densify", densifyOf(record)},
           {"prune_score", nameOf(m.score)},
-          {"prunes", prunesOf(record)}};
+          {"prunes", prunesOf(record)},
+          {"hits", record.hits}};
 }
 
 }  // namespace esvr::vdb2esvr

@@ -41,10 +41,6 @@ std::vector<PartOrigin> originOf(const Options& options, const Device& device) {
   return origin;
 }
 
-PartStore::Access accessOf(Job job, const Ranks* ranks) {
-  return job == Job::kPart || ranks ? PartStore::Access::kShared : PartStore::Access::kAlone;
-}
-
 /// Each GPU twice: while it fits a part, the next one is prepared on the host.
 std::vector<Device> withPreparation(const std::vector<Device>& devices) {
   std::vector<Device> workers = devices;
@@ -57,30 +53,18 @@ std::vector<Device> withPreparation(const std::vector<Device>& devices) {
 
 fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
 
-bool keepsParts(const Options& options) { return options.resume || options.job != Job::kWhole; }
-
-Parts::Parts(const Options& options, const Device& device, const CancelToken& cancel, Ranks* ranks)
-    : options_(options), cancel_(cancel), ranks_(ranks) {
-  const bool isShared = !ranks && options.job != Job::kWhole;
-  if (!isShared && !options.resume) return;
-  const fs::path folder = partsFolder(options);
-  if (options.job == Job::kMerge && !fs::exists(folder))
-    throw BadInput("cannot merge: there is no " + folder.string());
-  store_.emplace(folder, originOf(options, device), accessOf(options.job, ranks));
+Parts::Parts(const Options& options, const Device& device, Ranks* ranks) : ranks_(ranks) {
+  if (!options.resume) return;
+  store_.emplace(partsFolder(options), originOf(options, device),
+                 ranks ? PartStore::Access::kShared : PartStore::Access::kAlone);
 }
 
 PartRunner* Parts::runOn(const std::vector<Device>& devices, LostDevice onLost) {
+  PartStore* const store = store_ ? &*store_ : nullptr;
   if (ranks_)
-    runner_ = std::make_unique<RankWorkers>(*ranks_, devices, store_ ? &*store_ : nullptr);
-  else if (!store_)
-    runner_ = std::make_unique<DeviceWorkers>(withPreparation(devices), std::move(onLost));
+    runner_ = std::make_unique<RankWorkers>(*ranks_, devices, store);
   else
-    runner_ = std::make_unique<StoredParts>(
-        *store_, StoredPartsOptions{.devices = withPreparation(devices),
-                                    .share = options_.share,
-                                    .mergeOnly = options_.job == Job::kMerge,
-                                    .cancel = &cancel_,
-                                    .onLost = std::move(onLost)});
+    runner_ = std::make_unique<DeviceWorkers>(withPreparation(devices), std::move(onLost), store);
   return runner_.get();
 }
 

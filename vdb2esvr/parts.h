@@ -16,17 +16,14 @@ namespace esvr::vdb2esvr {
 /// The folder of a run's finished parts: that of OUT.esvr is OUT.esvr.parts.
 [[nodiscard]] std::filesystem::path partsFolder(const Options& options);
 
-/// True if a run keeps its finished parts in the folder.
-[[nodiscard]] bool keepsParts(const Options& options);
-
 class Parts {
  public:
-  /// Opens the folder of finished parts if the options want one.
+  /// Opens the folder of finished parts for --resume.
   /// \param device  the device that fits parts
   /// \param ranks   the processes that share the parts; may be null
   /// \throws BadInput  the folder belongs to another input, to other options or to fits on another
-  ///                   kind of device; or --merge is wanted and there is no folder
-  Parts(const Options& options, const Device& device, const CancelToken& cancel, Ranks* ranks);
+  ///                   kind of device
+  Parts(const Options& options, const Device& device, Ranks* ranks);
 
   /// \param devices  the devices that fit parts; the runner is valid until the next call
   /// \param onLost   is told when one of several devices fails
@@ -39,8 +36,6 @@ class Parts {
   void remove();
 
  private:
-  const Options& options_;
-  const CancelToken& cancel_;
   Ranks* ranks_;
   std::optional<PartStore> store_;
   std::unique_ptr<PartRunner> runner_;

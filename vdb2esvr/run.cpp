@@ -33,7 +33,7 @@ namespace {
 
 void checkFiles(const Options& options) {
   cli::requireSeparate(options.inputs.paths, {options.output, options.report});
-  const bool mayExist = options.overwrite || options.job == Job::kPart;  // it is not written
+  const bool mayExist = options.overwrite || options.onlyFits;  // it is not written
   cli::checkOutput(options.output, {".esvr"}, mayExist);
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
 }
@@ -109,7 +109,7 @@ class FileConversion {
     }
     collectVectors(record);
     record.interrupted = cancelled();
-    if (record.interrupted && (options_.onCancel == OnCancel::kDiscard || record.grids.empty()))
+    if (record.interrupted && (!options_.keepsBest() || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
   }
 
@@ -121,7 +121,7 @@ class FileConversion {
 
   /// What an interrupted run leaves.
   [[nodiscard]] std::string whatIsLeft() const {
-    if (!keepsParts(options_)) return "nothing was written";
+    if (!options_.resume) return "nothing was written";
     return "the finished parts are in " + partsFolder(options_).string() +
            ", and the same command continues";
   }
@@ -259,19 +259,6 @@ void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
                        " was written");
 }
 
-/// Ends a run that fits a share of the parts.
-void tellPart(const Options& options, const RunRecord& record, const cli::Log& log) {
-  const bool none = std::ranges::none_of(
-      record.grids, [](const ConvertedGrid& grid) { return grid.conversion.fit.chunks > 1; });
-  if (none)
-    log.warning(
-        "no grid was fitted in chunks, so that there are no parts; --chunk-voxels divides "
-        "a grid");
-  else
-    log.info("the parts are in " + partsFolder(options).string() + "; --merge writes " +
-             options.output.string());
-}
-
 /// The devices of this process. The ranks of a host take its GPUs in turn.
 std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
   if (!ranks) return selectDevices(options.device);
@@ -281,12 +268,12 @@ std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
   return {devices[std::size_t(ranks->rankOnHost()) % devices.size()]};
 }
 
-/// Reads the grids that the file holds unchanged. A process that fits parts only needs none.
+/// Reads the grids that the file holds unchanged. A process that only fits needs none.
 std::vector<CarriedGrid> readUnchanged(const Options& options,
                                        const std::vector<NotFitted>& carried) {
   std::vector<std::size_t> places;
   for (const auto& grid : carried) places.push_back(grid.place);
-  if (options.job == Job::kPart || places.empty()) return {};
+  if (options.onlyFits || places.empty()) return {};
   return readCarried(options.input, places, options.read);
 }
 
@@ -346,14 +333,11 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
   findScales(besides(carried, options), choice.fitted);
-  Parts parts(options, selected.front(), cancel, ranks);
+  Parts parts(options, selected.front(), ranks);
   FileConversion conversion(besides(carried, options), selected, cancel, parts, log);
   conversion.run(choice.fitted, carried, record);
   for (const auto& grid : record.grids) tellGrid(options, grid, log);
-  if (options.job == Job::kPart) {
-    if (!ranks) tellPart(options, record, log);
-    return record;
-  }
+  if (options.onlyFits) return record;
   EsvrFile file = carriedAndConverted(options, std::move(carried), record);
   shareGrids(optionsOfFits(options, cancel, conversion.device()), choice.fitted, file, record);
   const bool isShared = file.layout == FileLayout::kCompact;
@@ -382,12 +366,10 @@ RunRecord convertOrReport(const Options& options, Ranks* ranks, const cli::Inter
 /// The options of a rank. Rank 0 writes the file; the others only fit parts.
 Options optionsOf(const Options& options, const Ranks* ranks) {
   if (!ranks) return options;
-  if (options.job != Job::kWhole)
-    throw UsageError("the ranks of MPI need no --part and no --merge");
   if (options.paper) throw UsageError("fits by --paper have no parts for the ranks of MPI");
   Options own = options;
   if (ranks->rank() == 0) return own;
-  own.job = Job::kPart;
+  own.onlyFits = true;
   own.report.clear();
   own.progress = ProgressForm::kText;
   own.verbosity = cli::Verbosity::kQuiet;
@@ -396,7 +378,7 @@ Options optionsOf(const Options& options, const Ranks* ranks) {
 
 /// Open MPI kills the ranks a second after it has told them to end.
 void tellWhatSurvives(const Options& options, const cli::Log& log) {
-  if (keepsParts(options))
+  if (options.resume)
     return log.info("if MPI ends this run early, its finished parts stay in " +
                     partsFolder(options).string() + ", and the same command continues");
   log.info(
@@ -411,12 +393,12 @@ int runAs(const Options& options, Ranks* ranks) {
   const cli::ThreadLimit threads(options.threads);
   cli::Interrupts interrupts(ranks ? cli::FurtherSignals::kAreIgnored
                                    : cli::FurtherSignals::kEndAtOnce);
-  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
+  if (!options.keepsBest()) interrupts.discardResults();
   checkFiles(options);
   if (ranks) tellWhatSurvives(options, log);
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);
-  if (options.job == Job::kPart) {
-    if (ranks && record.interrupted) throw RuntimeFailure("interrupted");  // as rank 0 does
+  if (options.onlyFits) {
+    if (record.interrupted) throw RuntimeFailure("interrupted");  // as rank 0 does
     return 0;
   }
   tellResult(options, record);

@@ -130,7 +130,7 @@ int runSequence(const Options& options, const Ranks* ranks) {
         "sequence (--frames)");
   const cli::ThreadLimit threads(options.threads);
   cli::Interrupts interrupts;
-  if (options.onCancel == OnCancel::kDiscard) interrupts.discardResults();
+  if (!options.keepsBest()) interrupts.discardResults();
   cli::requireSeparate(cli::filesOfInput(options.input.string()), {options.report});
   if (reportIsFile(options)) cli::checkOutput(options.report, {".json"}, options.overwrite);
   const SequenceRecord record = convertFramesOrReport(options, interrupts.token());

@@ -13,9 +13,8 @@ namespace esvr::vdb2esvr {
 
 struct LeftOut {
   std::string part, why;
-  std::uint64_t bytesSaved = 0;  ///< bytes before compression; 0 if unknown
-  bool used = false;             ///< the file has the part; only decisionNotes() lists such parts
-  std::optional<std::uint64_t> bytesWith{}, bytesWithout{};  ///< measured bytes of the grid
+  bool used = false;  ///< the file has the part; only decisionNotes() lists such parts
+  std::optional<std::uint64_t> bytesWith{}, bytesWithout{};  ///< measured by a decision
   std::optional<double> seconds{};                           ///< time that deciding took
 };
 

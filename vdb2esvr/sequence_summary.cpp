@@ -9,6 +9,7 @@
 
 #include "cli/printable.h"
 #include "cli/table.h"
+#include "vdb2esvr/group_plan.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -79,7 +80,7 @@ void printGroups(const Options& options, const SequenceRecord& record, std::ostr
   for (const FrameRecord& frame : record.frames)
     if (frame.gridsDiffer) differing.push_back(frame.frame.number);
   out << cli::printable(options.output.string()) << ": " << record.file->groups
-      << (record.file->groups == 1 ? " group" : " groups") << " of at most " << options.groupFrames
+      << (record.file->groups == 1 ? " group" : " groups") << " of at most " << kGroupFrames
       << " frames\n";
   if (!differing.empty())
     out << (differing.size() == 1 ? "frame " : "frames ") << cli::textOfFrames(differing)

@@ -37,13 +37,10 @@ class Sharing {
 
   [[nodiscard]] ConvertedGrid& converted(std::size_t g) const { return record_.grids[g]; }
 
-  /// True if a grid holds voxels of its own, and the options let it share.
+  /// True if a grid holds voxels of its own that do not take too long to code again.
   [[nodiscard]] bool mayShare(std::size_t g) const {
-    const auto& places = options_.sharing.places;
-    const ConvertedGrid& grid = record_.grids[g];
-    const bool isNamed = places.empty() || places.contains(grid.id.place);
     const auto& voxels = file_.grids[g].voxels;
-    return isNamed && !grid.twinOf && voxels && voxels->codes.size() <= kMostShared;
+    return !record_.grids[g].twinOf && voxels && voxels->codes.size() <= kMostShared;
   }
 
   [[nodiscard]] std::vector<std::size_t> candidatesFor(std::size_t g) const {
@@ -111,8 +108,7 @@ class Sharing {
   [[nodiscard]] ConvertedGrid convertedAgain(std::size_t g, const VoxelReference& reference) const {
     const StoredGrid expected = expectedFrom(file_.grids, g, reference);
     Options options = options_;
-    options.convert.steadiness = 0.0;  // the errors of another grid are not worth keeping
-    options.countHits = false;
+    options.convert.keepsPastErrors = false;  // those of another grid are not worth keeping
     return convertGrid(options, fittedOf(g), std::nullopt, &expected);
   }
 
@@ -180,7 +176,7 @@ void shareGrids(const Options& options, const std::vector<FittedGrid>& fitted, E
                 RunRecord& record) {
   // The bytes of a wanted size are divided among grids that are stored on their own.
   const bool isSized = options.size || options.ratio;
-  if (!options.sharing.isOn || isSized || record.grids.size() < 2) return;
+  if (!options.shares || isSized || record.grids.size() < 2) return;
   Sharing(options, fitted, file, record).run();
   file.layout = FileLayout::kCompact;
 }

@@ -47,7 +47,7 @@ std::uint64_t bytesAddedBy(const RunRecord& record, const ConvertedVector& vecto
 bool mayCarry(const Options& options) {
   return options.convert.representation == Representation::kAuto &&
          options.convert.storage.form == Storage::kCompact && !options.size && !options.ratio &&
-         options.job == Job::kWhole;
+         !options.onlyFits;
 }
 
 /// Adds a grid at its place in the input.

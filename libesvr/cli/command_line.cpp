@@ -1,5 +1,6 @@
 #include "cli/command_line.h"
 
+#include <algorithm>
 #include <boost/program_options/errors.hpp>
 #include <boost/program_options/parsers.hpp>
 #include <iostream>
@@ -100,16 +101,37 @@ void CommandLine::optionalArgument(const std::string& name, const std::string& s
 
 void CommandLine::repeatedArgument(const std::string& name) { rest_ = name; }
 
+/// The own options that --help shows, or those that it leaves to `--help expert`.
+po::options_description CommandLine::shown(bool isExpert) const {
+  po::options_description part(isExpert ? "Expert options" : "Options", kLineLength,
+                               kMinDescriptionLength);
+  for (const auto& option : own_.options()) {
+    const bool isMain = main_.empty() || std::ranges::count(main_, option->long_name()) > 0;
+    if (isMain != isExpert) part.add(option);
+  }
+  return part;
+}
+
 std::string CommandLine::helpText() const {
   std::ostringstream out;
   out << wrapped(text_.purpose, kLineLength) << "\n\n";
   appendSection(out, "Usage:", text_.usage);
-  if (!own_.options().empty()) out << own_ << '\n';
+  if (const auto options = shown(false); !options.options().empty()) out << options << '\n';
   out << common_ << '\n';
   appendSection(out, "Notes:", wrapped(text_.notes, kLineLength));
+  if (hasExpertHelp()) out << text_.name << " --help expert shows further options and notes.\n\n";
   appendSection(out, "Examples:", text_.examples);
   std::string help = out.str();
   help.pop_back();  // removes the empty line after the last section
+  return help;
+}
+
+std::string CommandLine::expertText() const {
+  std::ostringstream out;
+  if (const auto options = shown(true); !options.options().empty()) out << options << '\n';
+  appendSection(out, "Notes:", wrapped(text_.details, kLineLength));
+  std::string help = out.str();
+  help.pop_back();
   return help;
 }
 
@@ -134,6 +156,7 @@ std::vector<OptionGroup> CommandLine::groups() const {
 std::optional<std::string> CommandLine::topic(const std::string& name) const {
   if (name == "man") return manPage(text_, groups());
   if (name == "options") return optionNames(groups());
+  if (name == "expert" && hasExpertHelp()) return expertText();
   const auto found = helpTopics_.find(name);
   return found == helpTopics_.end() ? std::nullopt : std::optional(found->second);
 }

@@ -49,8 +49,12 @@ class CommandLine {
  public:
   explicit CommandLine(ProgramText text);
 
-  /// The program's own options, as shown by --help.
+  /// The program's own options.
   po::options_description& options() { return own_; }
+
+  /// Names the options that --help shows, so that it fits on two screens. `--help expert` shows the
+  /// others and ProgramText::details. Without this call, --help shows all options.
+  void mainOptions(std::vector<std::string> names) { main_ = std::move(names); }
 
   /// Adds an argument without a dash. Arguments are taken in this order; the value is a
   /// std::string.
@@ -76,8 +80,6 @@ class CommandLine {
   /// \throws Error  as PipedInput, for an input that comes through a pipe
   [[nodiscard]] std::optional<Arguments> parse(int argc, const char* const* argv) const;
 
-  [[nodiscard]] std::string helpText() const;
-
  private:
   struct Argument {
     std::string name, shown;
@@ -89,9 +91,14 @@ class CommandLine {
   [[nodiscard]] std::vector<std::string> words(const po::variables_map& values) const;
   [[nodiscard]] std::optional<std::string> topic(const std::string& name) const;
   [[nodiscard]] std::vector<OptionGroup> groups() const;
+  [[nodiscard]] po::options_description shown(bool isExpert) const;
+  [[nodiscard]] bool hasExpertHelp() const { return !main_.empty() || !text_.details.empty(); }
+  [[nodiscard]] std::string helpText() const;
+  [[nodiscard]] std::string expertText() const;
 
   ProgramText text_;
   po::options_description own_, common_;
+  std::vector<std::string> main_;  ///< options that --help shows; empty: all
   std::vector<Argument> arguments_;
   std::map<std::string, std::string> helpTopics_;
   std::vector<std::string> volumeInputs_, textInputs_;  ///< names of arguments and options

@@ -88,7 +88,8 @@ std::string manPage(const ProgramText& text, const std::vector<OptionGroup>& gro
     for (const auto& option : group.options->options())
       out << ".TP\n" << titleOf(*option) << '\n' << escaped(option->description()) << '\n';
   }
-  addParagraphs(out, "NOTES", text.notes);
+  addParagraphs(out, "NOTES",
+                text.details.empty() ? text.notes : text.notes + "\n\n" + text.details);
   addLines(out, "EXAMPLES", text.examples);
   return out.str();
 }

@@ -49,7 +49,7 @@ Conversion stored(const Job& job, FitResult fit, const CommonFitOptions& options
     return conversion;
   }
   CompactResult compact =
-      convert::compacted(job, grid, fit, {.loss = storage.loss, .psnr = options.psnr});
+      convert::compacted(job, grid, fit, {.loss = CompactOptions{}.loss, .psnr = options.psnr});
   return convert::conversionOf(std::move(fit), std::move(compact));
 }
 

@@ -16,9 +16,10 @@ namespace {
 
 /// Where the bound cannot be chosen freely, higher prices than kPrice use up the PSNR that is left.
 constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
-/// Prices of a bit for frames that are predicted: with a steadiness of 0, and what steadiness adds.
-/// Voxels whose bits are not worth their price keep to the prediction, and so to the frame before.
-constexpr double kFramePrice = 0.14, kSteadyPrice = 0.12;
+/// Prices of a bit for voxels that are predicted from another grid, and from the frame before. Voxels
+/// whose bits are not worth their price keep to the prediction; in a frame this also means less
+/// flicker, so that the price is higher there (docs/lab-notes.md has the figures of other prices).
+constexpr double kPredictedPrice = 0.14, kFramePrice = 0.2;
 constexpr double kThriftOctaves = 0.08;  // bound's octaves that make up for the loss by kPrice
 constexpr int kMaxThriftyTrials = 4, kMaxFrameTrials = 10;
 /// Bits of an active voxel of a frame from which on exact voxels are tried, which take 8 at least in
@@ -66,7 +67,7 @@ class VoxelPsnrSearch {
   }
 
   [[nodiscard]] double framePrice() const {
-    return kFramePrice + kSteadyPrice * job_.options.steadiness;
+    return job_.options.keepsPastErrors ? kFramePrice : kPredictedPrice;
   }
 
   /// Thrifty voxels of a frame, or the trial if they do not reach the PSNR. Exact voxels are tried

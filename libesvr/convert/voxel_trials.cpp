@@ -18,7 +18,9 @@ namespace esvr::convert {
 namespace {
 
 constexpr double kPsnrTolerance = 0.05;  // dB above the wanted PSNR that end a search
-constexpr double kErrorsKept = 0.5;  // share of the errors of the frame before with steadiness 1
+/// Share of the errors of the frame before that voxels keep. On a fire and a gas, 0 takes fewer bytes
+/// and flickers; a half and more takes many bytes for little less flicker (docs/lab-notes.md).
+constexpr double kErrorsKept = 0.25;
 
 /// Share of the active voxels with the most frequent value from which on it is a plateau.
 constexpr double kPlateauShare = 0.02;
@@ -72,7 +74,7 @@ VoxelLayer VoxelTrials::nearestAt(double bound) const {
 ThriftOptions VoxelTrials::thriftOf(double price) const {
   const StoredGrid* previous = job_.options.previous;
   const VoxelLayer* layer = previous && previous->voxels ? &*previous->voxels : nullptr;
-  return {price, layer, kErrorsKept * job_.options.steadiness, voxelSigns(job_)};
+  return {price, layer, job_.options.keepsPastErrors ? kErrorsKept : 0.0, voxelSigns(job_)};
 }
 
 Trial VoxelTrials::tryBound(double bound, double price) const {

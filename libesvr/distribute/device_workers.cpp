@@ -7,9 +7,10 @@
 
 namespace esvr {
 
-DeviceWorkers::DeviceWorkers(std::vector<Device> devices, LostDevice onLost)
+DeviceWorkers::DeviceWorkers(std::vector<Device> devices, LostDevice onLost, PartStore* store)
     : devices_(std::move(devices)),
-      working_(std::make_unique<WorkingDevices>(devices_, std::move(onLost))) {}
+      working_(std::make_unique<WorkingDevices>(devices_, std::move(onLost))),
+      store_(store) {}
 
 DeviceWorkers::~DeviceWorkers() = default;
 
@@ -18,7 +19,8 @@ std::vector<std::vector<std::byte>> DeviceWorkers::run(const RoundParts& parts) 
   std::atomic<std::size_t> next{0};
   const auto work = [&](const Device& device) {
     for (std::size_t p = next++; p < parts.count(); p = next++)
-      results[p] = working_->fit(parts, p, device).bytes;
+      results[p] =
+          storedOrFitted(store_, parts, p, [&] { return working_->fit(parts, p, device); });
   };
   onDevices(devices_, work, [&] { next = parts.count(); });
   return results;

@@ -53,6 +53,16 @@ Device WorkingDevices::workingFor(const Device& device) {
   return left_[next_++ % left_.size()];
 }
 
+std::vector<std::byte> storedOrFitted(PartStore* store, const RoundParts& parts, std::size_t part,
+                                      const std::function<PartOutput()>& fit) {
+  if (!store) return fit().bytes;
+  const PartKey key = parts.keyOf(part);
+  if (auto found = store->find(key)) return std::move(*found);
+  PartOutput output = fit();
+  if (output.complete) store->put(key, output.bytes);
+  return std::move(output.bytes);
+}
+
 /// To be called while the device's error is handled, which is thrown again if no device is left.
 void WorkingDevices::lose(const Device& device, const std::string& why) {
   const std::lock_guard lock(mutex_);

@@ -10,6 +10,7 @@
 
 #include "esvr/device.h"
 #include "esvr/part_runner.h"
+#include "esvr/part_store.h"
 
 namespace esvr {
 
@@ -38,5 +39,12 @@ class WorkingDevices {
   std::size_t next_ = 0;      ///< counts the parts that were given to another device
   LostDevice onLost_;
 };
+
+/// The result of a part from the store, or what `fit` makes, which is then stored if it is complete.
+/// \param store  may be null
+/// \throws BadInput  the result in the store is damaged
+[[nodiscard]] std::vector<std::byte> storedOrFitted(PartStore* store, const RoundParts& parts,
+                                                    std::size_t part,
+                                                    const std::function<PartOutput()>& fit);
 
 }  // namespace esvr

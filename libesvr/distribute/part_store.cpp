@@ -18,6 +18,7 @@
 #include "core/atomic_file.h"
 #include "core/publish_file.h"
 #include "esvr/error.h"
+#include "esvr/progress.h"
 
 namespace esvr {
 namespace {
@@ -27,7 +28,6 @@ namespace fs = std::filesystem;
 constexpr const char* kLock = "lock";
 constexpr const char* kOrigin = "origin";
 constexpr const char* kResult = ".part";
-constexpr const char* kClaim = ".claim";
 constexpr mode_t kMode = 0666;  // reduced by the process's umask
 
 /// The start of a file with a result.
@@ -82,9 +82,8 @@ std::string textOf(const std::vector<PartOrigin>& origin) {
 bool isOurName(const std::string& name) {
   if (name == kLock || name == kOrigin) return true;
   const std::string stem = fs::path(name).stem().string();
-  const std::string extension = fs::path(name).extension().string();
   constexpr std::size_t kDigits = 32;
-  return (extension == kResult || extension == kClaim) && stem.size() == kDigits &&
+  return fs::path(name).extension() == kResult && stem.size() == kDigits &&
          stem.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
@@ -127,17 +126,15 @@ void PartStore::checkOrigin(const std::vector<PartOrigin>& origin) const {
   }
 }
 
-fs::path PartStore::fileOf(const PartKey& key, const char* extension) const {
+fs::path PartStore::fileOf(const PartKey& key) const {
   std::array<char, 33> digits{};
   std::snprintf(digits.data(), digits.size(), "%016llx%016llx",
                 static_cast<unsigned long long>(key[1]), static_cast<unsigned long long>(key[0]));
-  return folder_ / (std::string(digits.data()) + extension);
+  return folder_ / (std::string(digits.data()) + kResult);
 }
 
-bool PartStore::contains(const PartKey& key) const { return fs::exists(fileOf(key, kResult)); }
-
 std::optional<std::vector<std::byte>> PartStore::find(const PartKey& key) const {
-  const fs::path path = fileOf(key, kResult);
+  const fs::path path = fileOf(key);
   requirePlainFile(path);
   std::ifstream in(path, std::ios::binary);
   if (!in) return std::nullopt;
@@ -154,23 +151,12 @@ std::optional<std::vector<std::byte>> PartStore::find(const PartKey& key) const 
 
 void PartStore::put(const PartKey& key, std::span<const std::byte> result) {
   const ResultHead head{.bytes = result.size(), .hash = XXH3_64bits(result.data(), result.size())};
-  requirePlainFile(fileOf(key, kResult));
+  requirePlainFile(fileOf(key));
   const Completion completion;  // a part that is complete is kept
-  AtomicFile file(fileOf(key, kResult), true);
+  AtomicFile file(fileOf(key), true);
   file.write(std::as_bytes(std::span(&head, 1)));
   file.write(result);
   file.commit();
-}
-
-std::optional<PartStore::Claim> PartStore::claim(const PartKey& key) {
-  const fs::path path = fileOf(key, kClaim);
-  auto lock = tryLock(path, LOCK_EX);
-  if (!lock) return std::nullopt;
-  return std::optional<Claim>(std::in_place, path, std::move(*lock));
-}
-
-PartStore::Claim::~Claim() {
-  if (!path_.empty()) ::unlink(path_.c_str());  // while it is locked
 }
 
 void PartStore::remove() {

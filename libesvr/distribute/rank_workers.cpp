@@ -11,16 +11,6 @@ namespace esvr {
 RankWorkers::RankWorkers(Ranks& ranks, std::vector<Device> devices, PartStore* store)
     : ranks_(ranks), devices_(std::move(devices)), store_(store) {}
 
-std::vector<std::byte> RankWorkers::findOrFit(const RoundParts& parts, std::size_t part,
-                                              const Device& device) {
-  if (!store_) return parts.fit(part, device).bytes;
-  const PartKey key = parts.keyOf(part);
-  if (auto found = store_->find(key)) return std::move(*found);
-  PartOutput output = parts.fit(part, device);
-  if (output.complete) store_->put(key, output.bytes);
-  return std::move(output.bytes);
-}
-
 std::vector<std::vector<std::byte>> RankWorkers::run(const RoundParts& parts) {
   const PartKey key = parts.keyOf(0);
   if (!ranks_.agree(key[0] ^ parts.count()))
@@ -32,7 +22,8 @@ std::vector<std::vector<std::byte>> RankWorkers::run(const RoundParts& parts) {
   std::atomic<bool> stopped{false};
   const auto work = [&](const Device& device) {
     while (const auto part = ranks_.next())
-      if (!stopped) own[*part] = findOrFit(parts, *part, device);
+      if (!stopped)
+        own[*part] = storedOrFitted(store_, parts, *part, [&] { return parts.fit(*part, device); });
   };
   onDevices(devices_, work, [&] { stopped = true; });
   return ranks_.exchange(std::move(own));

@@ -11,6 +11,11 @@ namespace {
 
 using Counts = std::array<std::uint32_t, kBrickVoxels>;
 
+struct EllipsoidHits {
+  std::uint64_t voxelPairs = 0;  // pairs of an ellipsoid and a voxel in its support
+  std::uint64_t voxels = 0;      // voxels that lie in at least one support
+};
+
 /// Adds 1 to every voxel of a brick that lies in an ellipsoid's support.
 void addHits(const LineForm& f, const std::array<float, 3>& corner, float cutoff, Counts& counts) {
   const float cx = f.center[0] - corner[0], cy = f.center[1] - corner[1],
@@ -49,18 +54,14 @@ EllipsoidHits hitsInBrick(const EvaluatePlan& plan, std::size_t b, Coord brickCo
 
 }  // namespace
 
-EllipsoidHits countHits(const Field& field, std::span<const Coord> corners) {
+double averageHits(const Field& field) {
+  const std::vector<Coord> corners = reachedBricks(field);
   const EvaluatePlan plan = planEvaluation(field, corners);
   std::vector<EllipsoidHits> hits(corners.size());
   parallelFor(std::size_t(0), corners.size(),
               [&](std::size_t b) { hits[b] = hitsInBrick(plan, b, corners[b]); });
   EllipsoidHits total;
   for (const EllipsoidHits& h : hits) total.voxelPairs += h.voxelPairs, total.voxels += h.voxels;
-  return total;
-}
-
-double averageHits(const Field& field) {
-  const EllipsoidHits total = countHits(field, reachedBricks(field));
   return total.voxels > 0 ? double(total.voxelPairs) / double(total.voxels) : 0.0;
 }
 

@@ -54,7 +54,6 @@ FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
   result.field = exportField(ellipsoids,
                              {volume.origin, target.scale, volume.background, optimiser->kernel()});
   result.range = rangeOf(volume.background, target);
-  result.kappaLearned = plan.learnKappa;
   result.end = end.end;
   result.curve = recorder.curve();
   result.wanted = plan.count;

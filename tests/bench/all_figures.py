@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Remakes the documents whose figures scripts measure: stability, economy, comparison, resolution and the paper's.
+"""Remakes the documents whose figures scripts measure: stability, comparison, resolution and the paper's.
 
     all_figures.py volumes --bin BUILD --data DATA --out OUT                makes the stand-ins for the paper's volumes
     all_figures.py gpu   --bin BUILD --data DATA --out OUT --machine TEXT   measures what needs a GPU
@@ -13,7 +13,7 @@ and the exit code is then 1. `pages` writes the tables of the paper's method to 
 around them. DATA/swc has the skeletons of docs/data.md. --rivals is a folder with the programs sz3, sperr3d, tthresh and
 instant_ngp (samples/README.md); without it, they have no rows.
 
-`agree` compares the JSON files that stability.py, economy.py and paper/measure.py keep in docs. Bytes, numbers of ellipsoids and other
+`agree` compares the JSON files that stability.py and paper/measure.py keep in docs. Bytes, numbers of ellipsoids and other
 figures that do not depend on time agree within 3 %, PSNR within 0.5 dB, and largest errors within a factor of 3, as the
 quality tests have it for other processors. Times are not compared.
 """
@@ -26,7 +26,7 @@ import sys
 
 HERE = pathlib.Path(__file__).parent
 PARTS = ("volumes", "gpu", "cpu", "pages")
-DOCUMENTS = ["stability", "economy", "comparison", "resolution", "paper"]
+DOCUMENTS = ["stability", "comparison", "resolution", "paper"]
 SKELETONS = (754538881, 722817260, 1734350788)  # those of docs/data.md
 SHARE, DB, FACTOR = 0.03, 0.5, 3.0
 # Keys of errors that depend on a few voxels, and of figures that are times or say where they were measured.
@@ -58,9 +58,6 @@ def commands(arguments):
         ("stability", "gpu", ["stability.py", "measure", *bench, "--device", "cuda"]),
         ("stability", "cpu", ["stability.py", "measure", *bench, "--device", "cpu"]),
         ("stability", "pages", ["stability.py", "page"]),
-        ("economy", "gpu", ["economy.py", "measure", *data, *machine, "--device", "cuda"]),
-        ("economy", "cpu", ["economy.py", "measure", *data, *machine]),
-        ("economy", "pages", ["economy.py", "page"]),
         ("comparison", "gpu", ["comparison.py", "fit", *comparison, "--device", "cuda"]),
         ("comparison", "gpu", ["comparison.py", "tables", *comparison, "--device", "cuda"]),
         ("comparison", "cpu", ["comparison.py", "rivals", *comparison]),

@@ -100,7 +100,7 @@ def large(arguments):
     run([arguments.bin / "samples/swc2vdb", arguments.swc, volume, "--resolution", "7400",
          "--min-radius", "5.4", "--force"])
     run([arguments.bin / "vdb2esvr/vdb2esvr", volume, file, "--count", "150000", "--storage",
-         "float32", "--representation", "ellipsoids", "--kappa", "2", "--seconds", "15", "--device",
+         "float32", "--representation", "ellipsoids", "--seconds", "15", "--device",
          arguments.device, "--force"])
     for lod in ["off", "auto"]:
         report = bench(arguments, file, "--turntable", "120", "--ref", volume, "--lod", lod,

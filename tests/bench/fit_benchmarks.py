@@ -3,7 +3,6 @@
 
     fit_benchmarks.py figures --bin BUILD --data DIR --out OUT   converts volumes of DIR on the CPU
     fit_benchmarks.py gpu --bin BUILD --data DIR --out OUT       converts them on a GPU, by phase
-    fit_benchmarks.py pairs --bin BUILD --data DIR --out OUT     voxel pairs per second
     fit_benchmarks.py scaling --bin BUILD --out OUT              seconds per iteration at eight resolutions
     fit_benchmarks.py draw --out OUT                             draws the figures of these results
 
@@ -44,8 +43,6 @@ GPU_FIGURES = [
     ("dragon_with_xform", ["--count", "8000"], ""),
     ("cube_levelset", ["--count", "12000"], ""),
 ]
-DENSE_RESOLUTION = 384
-DENSE_COUNTS = ["20000", "100000"]
 GPU_STORAGES = ["float32", "compact"]
 TREE_RESOLUTIONS = [64, 96, 128, 192, 256, 384, 512, 768]
 VOXELS_PER_ELLIPSOID = 35  # as the standard preset has it
@@ -126,29 +123,6 @@ def gpu_row(row):
             f"{row['bytes_out'] / 1e3:.0f} | {row['asked']} |")
 
 
-def pairs(arguments):
-    """Voxel pairs per second. Every iteration is taken to have as many as the finished fit."""
-    dense = arguments.out / "dense.vdb"
-    run([arguments.bin / "samples/esvr-sample", "diffuse-scalar", dense, "--resolution",
-         DENSE_RESOLUTION, "--force"])
-    rows = [(arguments.data / f"{name}.vdb", options) for name, options, _ in GPU_FIGURES
-            if options[0] == "--count"]
-    rows += [(dense, ["--count", count]) for count in DENSE_COUNTS]
-    for source, options in rows:
-        report = convert(arguments.bin, source, arguments.out / "pairs.esvr",
-                         [*options, "--storage", "float32", "--hits"], ("--device", "cuda"))
-        print(pairs_row(source.stem, options[1], report["grids"][0]), flush=True)
-
-
-def pairs_row(name, count, grid):
-    iterations = grid["curve"][-1]["iteration"]
-    each = grid["fit"]["voxel_pairs"]
-    seconds = grid["seconds"]["optimise"]
-    return (f"| {name} | {count} | {grid['source']['bricks']} | {grid['fit']['hits']:.1f} | "
-            f"{each / 1e6:.1f} | {1e3 * seconds / iterations:.3f} | "
-            f"{each * iterations / seconds:.2e} |")
-
-
 def scaling(arguments):
     rows = []
     for resolution in TREE_RESOLUTIONS:
@@ -158,7 +132,7 @@ def scaling(arguments):
         tree = source_of(arguments.bin, source)
         count = max(1, tree["active_voxels"] // VOXELS_PER_ELLIPSOID)
         report = convert(arguments.bin, source, source.with_suffix(".esvr"),
-                         ["--count", count, "--iterations", SCALING_ITERATIONS, "--kappa", 2])
+                         ["--count", count, "--iterations", SCALING_ITERATIONS])
         seconds = report["seconds"]["optimise"] / SCALING_ITERATIONS
         rows.append({"resolution": resolution, "leaves": tree["bricks"],
                      "voxels": tree["active_voxels"], "seconds_per_iteration": seconds,
@@ -170,7 +144,7 @@ def scaling(arguments):
 def source_of(programs, source):
     """The properties of a grid, from the report of a fit of one ellipsoid."""
     report = convert(programs, source, source.with_suffix(".esvr"),
-                     ["--count", 1, "--iterations", 1, "--kappa", 2])
+                     ["--count", 1, "--iterations", 1])
     return report["grids"][0]["source"]
 
 
@@ -217,15 +191,15 @@ def draw_scaling(pyplot, rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["figures", "gpu", "pairs", "scaling", "draw"])
+    parser.add_argument("what", choices=["figures", "gpu", "scaling", "draw"])
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
     parser.add_argument("--data", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
-    if arguments.what in ("figures", "gpu", "pairs") and not arguments.data:
+    if arguments.what in ("figures", "gpu") and not arguments.data:
         parser.error(f"{arguments.what} needs --data")
     arguments.out.mkdir(parents=True, exist_ok=True)
-    {"figures": figures, "gpu": gpu, "pairs": pairs, "scaling": scaling,
+    {"figures": figures, "gpu": gpu, "scaling": scaling,
      "draw": draw}[arguments.what](arguments)
 
 

@@ -1,6 +1,6 @@
 /// Compares frames that are predicted from the frame before with files of their own.
 ///
-///     bench_frames GRID PSNR STEADINESS GOP DEVICE FILE...
+///     bench_frames GRID PSNR GOP DEVICE FILE...
 ///
 /// The files are those of a sequence, in its order. The grid of each file is converted to voxels of a
 /// PSNR (dB) over the box twice, on DEVICE ("cpu", "cuda"): alone, and as a frame of a group of GOP
@@ -30,7 +30,7 @@ namespace {
 
 struct Settings {
   std::string grid;
-  double psnr = 0.0, steadiness = 0.0;
+  double psnr = 0.0;
   std::size_t framesOfGroup = 1;
   Device device{};
   bool predicted = false;
@@ -78,8 +78,7 @@ class Run {
                            .representation = Representation::kVoxels,
                            .fit = {},
                            .storage = {},
-                           .previous = previous ? &previous->grids.front() : nullptr,
-                           .steadiness = settings_.steadiness};
+                           .previous = previous ? &previous->grids.front() : nullptr};
     options.fit.device = settings_.device;
     const EsvrFile file{{}, {convertVolume({source.descriptor, source.volume}, options).grid}};
     const auto bytes = encodeFrame(file, previous);
@@ -137,14 +136,14 @@ void compare(Settings settings, const std::vector<std::string>& files) {
 }  // namespace esvr
 
 int main(int count, char** arguments) try {
-  if (count < 8) {
-    std::cerr << "usage: bench_frames GRID PSNR STEADINESS GOP DEVICE FILE FILE...\n";
+  if (count < 7) {
+    std::cerr << "usage: bench_frames GRID PSNR GOP DEVICE FILE FILE...\n";
     return EXIT_FAILURE;
   }
-  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[4]), 1));
-  esvr::compare({arguments[1], std::atof(arguments[2]), std::atof(arguments[3]), framesOfGroup,
-                 esvr::selectDevice(arguments[5])},
-                {arguments + 6, arguments + count});
+  const auto framesOfGroup = std::size_t(std::max(std::atoi(arguments[3]), 1));
+  esvr::compare({arguments[1], std::atof(arguments[2]), framesOfGroup,
+                 esvr::selectDevice(arguments[4])},
+                {arguments + 5, arguments + count});
   return EXIT_SUCCESS;
 } catch (const esvr::Error& error) {
   std::cerr << "bench_frames: " << error.what() << "\n";

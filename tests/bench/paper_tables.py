@@ -66,7 +66,7 @@ def sources(arguments):
 def method(arguments, **keys):
     """The options of a run by the paper's method."""
     keys = {"epochs": arguments.epochs, **keys}
-    return ["--paper", ",".join(f"{k.replace('_', '-')}={v}" for k, v in keys.items()), "--hits",
+    return ["--paper", ",".join(f"{k.replace('_', '-')}={v}" for k, v in keys.items()),
             *BY_VALUE]
 
 
@@ -123,7 +123,7 @@ def second_jobs(arguments, found, rows):
     pruning passes, and a run without pruning that starts from half as many points."""
     for name, (source, box) in found.items():
         count = pruned(rows, name)
-        yield name, "default", source, box, ["--count", count, "--storage", "float32", "--hits",
+        yield name, "default", source, box, ["--count", count, "--storage", "float32",
                                               *BY_VALUE]
         if name in arguments.ablate:
             yield (name, "score full in three passes", source, box,
@@ -182,13 +182,12 @@ def type_rows(rows):
                 continue
             before = grid["paper"]["prunes"][0]
             cells = [cell(before["before"], before["psnr_box_before"], before["hits_before"]),
-                     cell(grid["ellipsoids"], grid["metrics"]["psnr_box"], grid["fit"]["hits"])]
+                     cell(grid["ellipsoids"], grid["metrics"]["psnr_box"], grid["paper"]["hits"])]
             cells += [cell(1000 * n, psnr, hits) for n, psnr, hits in theirs[kind]]
             yield f"| {name} | {kind} | " + " | ".join(cells) + " |"
         if default := by_key.get((name, "default")):
             yield (f"| {name} | *default fit* | | "
-                   + cell(default["ellipsoids"], default["metrics"]["psnr_box"],
-                          default["fit"]["hits"]) + " | | |")
+                   + cell(default["ellipsoids"], default["metrics"]["psnr_box"]) + " | | |")
 
 
 def ablation_rows(rows, prefix, theirs, first):
@@ -204,7 +203,7 @@ def ablation_rows(rows, prefix, theirs, first):
             if name == "aneurism" and key in theirs:
                 paper_cell = cell(1000 * theirs[key][1], theirs[key][0])
             yield (f"| {name} | {key} | "
-                   + cell(grid["ellipsoids"], grid["metrics"]["psnr_box"], grid["fit"]["hits"])
+                   + cell(grid["ellipsoids"], grid["metrics"]["psnr_box"], grid["paper"]["hits"])
                    + f" | {paper_cell} |")
 
 

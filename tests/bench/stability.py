@@ -20,7 +20,7 @@ from run_program import run
 DEVICES = {"cpu": "CPU", "cuda": "CUDA"}
 COLORS = {0.5: "#3b82f6", 1.0: "#16a34a", 2.0: "#ea580c"}  # by multiples of the tuned step sizes
 IN_CHUNKS = "#a21caf"
-ALLOWED = 1e-4       # share of the peak; the default of esvr-compare stability --max-difference
+ALLOWED = 1e-4       # share of the peak
 LOSS = 3.0           # dB, by which a fit is worse than that with the tuned steps
 EXACT = 999.0        # dB, which stand for no error
 PANELS = 6           # charts of a picture
@@ -37,8 +37,7 @@ case below is measured in three ways:
 - **Evaluation.** A sum of ellipsoids is evaluated in float32 and by its definition in float64 at all voxels of up to 512
   bricks. The CPU's is the function that decodes files, and CUDA's the decoder of `esvr-render`. Differences and bounds are
   shares of the peak. The bound follows from the arithmetic ([math.md](math.md#rounding)) and adds the worst case of all
-  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the peak, as in
-  `esvr-compare stability`.
+  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the peak.
 - **Gradients.** The analytic derivatives of the squared error by all parameters of four ellipsoids and by kappa are
   compared with central differences in float64, in a target of 16^3 random values. Errors are shares of the sum of the
   magnitudes of the terms of the largest derivative of an ellipsoid. A case fails if an error is above its

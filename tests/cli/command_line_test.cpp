@@ -119,6 +119,39 @@ TEST(CommandLine, helpSaysAllAndNeedsNoArguments) {
   EXPECT_THAT(help, testing::Not(HasSubstr("Notes:"))) << "an empty section is left out";
 }
 
+/// What a command line prints for `--help` and a topic.
+std::string helpOf(const CommandLine& line, const char* topic) {
+  const char* const given[] = {"esvr-example", "--help", topic};
+  CaptureStdout();
+  EXPECT_FALSE(line.parse(3, given));
+  return GetCapturedStdout();
+}
+
+TEST(CommandLine, expertHelpHasWhatTheMainHelpLeavesOut) {
+  CommandLine line({.name = "esvr-example",
+                    .purpose = "Does an example.",
+                    .usage = "  esvr-example",
+                    .notes = "For all.",
+                    .details = "For experts.",
+                    .examples = ""});
+  line.options().add_options()("size", po::value<int>(), "how large")("low", po::value<int>(), "");
+  line.mainOptions({"size"});
+  EXPECT_THAT(
+      helpOf(line, "x"),
+      testing::AllOf(HasSubstr("--size"), HasSubstr("For all."), HasSubstr("--help expert"),
+                     testing::Not(HasSubstr("--low")), testing::Not(HasSubstr("For experts."))));
+  EXPECT_THAT(helpOf(line, "expert"), testing::AllOf(HasSubstr("--low"), HasSubstr("For experts."),
+                                                     testing::Not(HasSubstr("--size"))));
+  EXPECT_EQ(helpOf(line, "options").substr(0, 13), "--size\n--low\n");
+  EXPECT_THAT(helpOf(line, "man"), testing::AllOf(HasSubstr("low"), HasSubstr("For experts.")));
+}
+
+TEST(CommandLine, helpHasAllWhereNothingIsForExperts) {
+  EXPECT_THAT(helpOf(exampleLine(), "expert"),
+              testing::AllOf(HasSubstr("--size"), HasSubstr("--low"),
+                             testing::Not(HasSubstr("--help expert"))));
+}
+
 TEST(CommandLine, helpBreaksTheLinesOfParagraphs) {
   std::string words;
   for (int i = 0; i < 40; ++i) words += "word ";

@@ -12,7 +12,7 @@
 
 namespace esvr::test {
 
-/// Runs a command of the program: "check", "table", "curves" or "stability".
+/// Runs a command of the program: "check", "table" or "curves".
 inline ProgramRun compare(const std::string& command, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), command);
   return runProgram(ESVR_COMPARE, arguments);

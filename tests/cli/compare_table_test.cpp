@@ -116,7 +116,7 @@ TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
   // The smallest VDB file has about 1500 bytes. A candidate must be larger, so that other rows can
   // match its size.
   ASSERT_EQ(test::vdb2esvr({at("ref.vdb"), at("large.esvr"), "--count", "60", "--iterations", "60",
-                            "--kappa", "0", "--storage", "float32"})
+                            "--storage", "float32"})
                 .exitCode,
             0);
   const auto report = reportOf({at("large.esvr"), "--rows", "matched,zfp", "--size", "2KB"});

@@ -18,7 +18,7 @@ inline ProgramRun esvr2vdb(const std::vector<std::string>& arguments) {
 /// A fit that takes milliseconds.
 inline ProgramRun quickFit(const std::string& input, const std::string& output,
                            std::vector<std::string> more = {}) {
-  more.insert(more.begin(), {input, output, "--count", "30", "--iterations", "60", "--kappa", "0",
+  more.insert(more.begin(), {input, output, "--count", "30", "--iterations", "60",
                              "--representation", "ellipsoids"});
   return vdb2esvr(more);
 }

@@ -83,8 +83,7 @@ Words quickened(Words words) {
   }
   if (words[0] == "esvr-compare" && words[1] == "curves") set(words, "--fit", "3KB");
   if (words[0] != "esvr2vdb" || !has(words, "--list"))
-    if (words[0] != "esvr-compare" || (words[1] != "check" && words[1] != "stability"))
-      words.emplace_back("--force");
+    if (words[0] != "esvr-compare" || words[1] != "check") words.emplace_back("--force");
   return words;
 }
 

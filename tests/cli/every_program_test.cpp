@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <ostream>
 #include <regex>
 #include <sstream>
@@ -61,11 +62,15 @@ class EveryProgram : public test::FolderTest, public testing::WithParamInterface
     EXPECT_EQ(result.exitCode, 0) << result.err;
     return result;
   }
+  /// The command of a program that has several.
+  [[nodiscard]] std::vector<std::string> job() const {
+    if (std::string(GetParam().path) != ESVR_COMPARE) return {};
+    return {GetParam().arguments[0]};
+  }
 };
 
 TEST_P(EveryProgram, helpAndVersionNeedNoFiles) {
-  std::vector<std::string> job;
-  if (std::string(GetParam().path) == ESVR_COMPARE) job = {GetParam().arguments[0]};
+  std::vector<std::string> job = this->job();
   for (const char* option : {"--help", "-h"}) {
     auto arguments = job;
     arguments.emplace_back(option);
@@ -75,6 +80,14 @@ TEST_P(EveryProgram, helpAndVersionNeedNoFiles) {
   job.emplace_back("--version");
   EXPECT_THAT(test::runProgram(GetParam().path, job).out,
               AllOf(HasSubstr("0."), HasSubstr("OpenVDB")));
+}
+
+TEST_P(EveryProgram, helpFitsOnTwoScreens) {
+  constexpr std::ptrdiff_t kTwoScreens = 100;  // lines
+  std::vector<std::string> arguments = job();
+  arguments.emplace_back("--help");
+  const std::string help = test::runProgram(GetParam().path, arguments).out;
+  EXPECT_LE(std::ranges::count(help, '\n'), kTwoScreens);
 }
 
 TEST_P(EveryProgram, saysNothingWhereQuietAndMoreWhereVerbose) {
@@ -112,7 +125,6 @@ INSTANTIATE_TEST_SUITE_P(
             "curves",
             ESVR_COMPARE,
             {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}},
-        ProgramCommand{"stability", ESVR_COMPARE, {"stability", "DIR/in.esvr", "--device", "cpu"}},
         ProgramCommand{
             "image2vdb",
             IMAGE2VDB,

@@ -102,15 +102,6 @@ TEST_F(LeftOut, namesLayersAndTheGpuOnlyForEllipsoids) {
   }
 }
 
-TEST_F(LeftOut, hasTheBytesThatPartsOfEllipsoidsWouldTake) {
-  const Json grid = gridOf(test::softBall({}), {"--count", "9", "--representation", "ellipsoids"});
-  for (const char* part : {"voxel masks", "chunk table"}) {
-    const Json entry = entryOf(grid, part);
-    EXPECT_GT(entry["bytes_with"], entry["bytes_without"]) << part;
-    EXPECT_GE(entry["bytes_without"], grid["bytes"]) << part << ": rows of the table count, too";
-  }
-}
-
 TEST_F(LeftOut, hasTheSecondsOfTheShortFitsThatAClampMakesPossible) {
   Voxels flat = test::softBall({});
   for (auto& voxel : flat) voxel.value = std::min(voxel.value, 0.5f);

@@ -15,7 +15,6 @@
 #include "esvr/container.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
-#include "esvr/temporal_metrics.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {
@@ -32,6 +31,8 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using Words = std::vector<std::string>;
+
+constexpr int kGroup = 16;  ///< frames of a group
 
 class OneFile : public test::FolderTest {
  protected:
@@ -83,28 +84,34 @@ class OneFile : public test::FolderTest {
 };
 
 TEST_F(OneFile, hasTheFramesByTheirNumbers) {
-  writeFrames(-3, 6);
-  const auto run = convert({"--gop", "4", "--report", at("r.json")});
+  constexpr int kFrames = 2 * kGroup + 2;
+  writeFrames(-3, kFrames - 4);
+  const auto run = convert({"--report", at("r.json")});
   ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("out.esvr: 3 groups of at most 4 frames"));
+  EXPECT_THAT(run.out, HasSubstr("out.esvr: 3 groups of at most 16 frames"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr", "r.json"));
-  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(-3, -2, -1, 0, 1, 2, 3, 4, 5, 6));
-  EXPECT_THAT(groupsIn("out.esvr"), ElementsAre(0, 0, 0, 0, 1, 1, 1, 1, 2, 2));
+  const auto numbers = numbersIn("out.esvr");
+  const auto groups = groupsIn("out.esvr");
+  ASSERT_EQ(numbers.size(), std::size_t(kFrames));
+  for (std::size_t i = 0; i < std::size_t(kFrames); ++i) {
+    EXPECT_EQ(numbers[i], std::int64_t(i) - 3);
+    EXPECT_EQ(groups[i], i / kGroup);
+  }
   SequenceReader reader(at("out.esvr"));
-  for (const std::int64_t frame : {6, -3, 0, 5}) expectVoxels(reader, frame, frame);
+  for (const std::int64_t frame : {kFrames - 4, -3, 0, kGroup}) expectVoxels(reader, frame, frame);
   const Json report = Json::parse(bytesOf("r.json"));
   EXPECT_EQ(report["output"]["bytes"], sizeOf("out.esvr"));
   EXPECT_EQ(report["output"]["groups"], 3);
-  EXPECT_EQ(report["frames"][9]["group"], 2);
+  EXPECT_EQ(report["frames"][kFrames - 1]["group"], 2);
   EXPECT_EQ(report["frames"][9]["output"]["bytes"], reader.frames()[9].bytes);
 }
 
 TEST_F(OneFile, hasTheSameBytesOnAnyNumberOfThreads) {
-  writeFrames(1, 9);
-  ASSERT_EQ(convert({"--gop", "2", "--threads", "1"}).exitCode, 0);
-  ASSERT_EQ(convert({"--gop", "2", "--threads", "4"}, "four.esvr").exitCode, 0);
+  writeFrames(1, 2 * kGroup + 1);
+  ASSERT_EQ(convert({"--threads", "1"}).exitCode, 0);
+  ASSERT_EQ(convert({"--threads", "4"}, "four.esvr").exitCode, 0);
   EXPECT_TRUE(bytesOf("four.esvr") == bytesOf("out.esvr"));
-  ASSERT_EQ(convert({"--gop", "2", "--frames", "9-1"}, "down.esvr").exitCode, 0);
+  ASSERT_EQ(convert({"--frames", "33-1"}, "down.esvr").exitCode, 0);
   EXPECT_TRUE(bytesOf("down.esvr") == bytesOf("out.esvr")) << "frames are sorted";
 }
 
@@ -135,10 +142,15 @@ TEST_F(OneFile, holdsOrSkipsMissingFrames) {
   EXPECT_THAT(outputs(), IsEmpty());
   ASSERT_EQ(convert({"--frames", "1-5", "--missing", "skip"}).exitCode, 0);
   EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 5));
-  const auto held = convert({"--frames", "1-5", "--missing", "hold", "--gop", "2"}, "held.esvr");
+  writeFrames(6, 18);  // 16 frames have an input
+  writeFrames(20, 20);
+  const auto held = convert({"--frames", "1-20", "--missing", "hold"}, "held.esvr");
   ASSERT_EQ(held.exitCode, 0) << held.err;
   EXPECT_THAT(held.out, HasSubstr("held from 2"));
-  EXPECT_THAT(groupsIn("held.esvr"), ElementsAre(0, 0, 0, 0, 1));
+  const auto groups = groupsIn("held.esvr");
+  ASSERT_EQ(groups.size(), 20u);
+  EXPECT_EQ(groups[18], 0u) << "frame 19 holds the last frame of the first group";
+  EXPECT_EQ(groups[19], 1u);
   SequenceReader reader(at("held.esvr"));
   for (const std::int64_t frame : {3, 4}) expectVoxels(reader, frame, 2);
 }
@@ -146,32 +158,34 @@ TEST_F(OneFile, holdsOrSkipsMissingFrames) {
 TEST_F(OneFile, lacksFramesThatAreDamaged) {
   writeFrames(1, 4);
   test::writeText(at("in.2.vdb"), "no volume");
-  const auto run = convert({"--gop", "2"});
+  const auto run = convert();
   EXPECT_EQ(run.exitCode, 3);
   EXPECT_THAT(run.err, HasSubstr("1 of 4 frames failed: 2"));
   EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 3, 4));
 }
 
 TEST_F(OneFile, isContinuedAfterItStopped) {
-  writeFrames(1, 8);
-  ASSERT_EQ(convert({"--gop", "2"}, "whole.esvr").exitCode, 0);
-  fs::rename(at("in.6.vdb"), at("in.six"));
-  test::writeText(at("in.6.vdb"), "no volume");
-  const auto stopped = convert({"--gop", "2", "--on-error", "stop", "--threads", "1"});
+  writeFrames(1, kGroup + 4);
+  ASSERT_EQ(convert({}, "whole.esvr").exitCode, 0);
+  fs::rename(at("in.18.vdb"), at("in.eighteen"));
+  test::writeText(at("in.18.vdb"), "no volume");
+  const auto stopped = convert({"--on-error", "stop", "--threads", "1"});
   EXPECT_EQ(stopped.exitCode, 3);
   EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "whole.esvr"));
-  const auto refused = convert({"--gop", "2"});
+  const auto refused = convert();
   EXPECT_EQ(refused.exitCode, 1);
   EXPECT_THAT(refused.err, AllOf(HasSubstr("out.esvr.partial"), HasSubstr("--resume")));
-  const auto other = convert({"--gop", "3", "--resume"});
-  EXPECT_EQ(other.exitCode, 2);
-  EXPECT_THAT(other.err, HasSubstr("has other groups"));
-  const auto fewer = convert({"--gop", "2", "--resume", "--frames", "2-8"});
+  const auto fewer = convert({"--resume", "--frames", "2-20"});
   EXPECT_EQ(fewer.exitCode, 2);
   EXPECT_THAT(fewer.err, HasSubstr("has frame 1"));
+  writeFrames(0, 0);
+  const auto other = convert({"--resume"});
+  EXPECT_EQ(other.exitCode, 2);
+  EXPECT_THAT(other.err, HasSubstr("has other groups"));
 
-  fs::rename(at("in.six"), at("in.6.vdb"));
-  const auto run = convert({"--gop", "2", "--resume"});
+  fs::remove(at("in.0.vdb"));
+  fs::rename(at("in.eighteen"), at("in.18.vdb"));
+  const auto run = convert({"--resume"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("kept"));
   EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
@@ -179,11 +193,11 @@ TEST_F(OneFile, isContinuedAfterItStopped) {
 }
 
 TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
-  writeFrames(1, 4);
-  ASSERT_EQ(convert({"--gop", "2"}, "whole.esvr").exitCode, 0);
+  writeFrames(1, kGroup + 2);
+  ASSERT_EQ(convert({}, "whole.esvr").exitCode, 0);
   const std::string whole = bytesOf("whole.esvr");
   const SequenceReader reader(at("whole.esvr"));
-  const std::uint64_t second = reader.frames()[2].offset;
+  const std::uint64_t second = reader.frames()[kGroup].offset;
   for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{30}, second - 1, second + 9}) {
     test::writeText(at("out.esvr.partial"), "");
     std::string left = whole.substr(0, bytes);
@@ -193,57 +207,61 @@ TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
       left.replace(0, 48, bytesOf("empty.esvr.partial"));
     }
     test::writeText(at("out.esvr.partial"), left);
-    const auto run = convert({"--gop", "2", "--resume"});
+    const auto run = convert({"--resume"});
     ASSERT_EQ(run.exitCode, 0) << run.err;
     EXPECT_TRUE(bytesOf("out.esvr") == whole) << bytes;
     fs::remove(at("out.esvr"));
   }
 }
 
-TEST_F(OneFile, isContinuedAfterTheProgramWasKilled) {
-  writeFrames(1, 4);
-  const Words words{"--gop",     "2", "--representation", "ellipsoids", "--preset", "draft",
-                    "--threads", "1", "--progress",       "json"};
-  const auto commandFor = [&](const std::string& output) {
-    Words all{at("in.@.vdb"), at(output), "--device", "cpu"};
-    all.insert(all.end(), words.begin(), words.end());
-    return all;
-  };
-  ASSERT_EQ(vdb2esvr(commandFor("whole.esvr")).exitCode, 0);
-  writeFrame(3, {{.voxels = test::cloud(30)}});  // it takes seconds
+/// A sequence of a whole group and of a frame that takes seconds.
+class SlowLastFrame : public OneFile {
+ protected:
+  SlowLastFrame() {
+    writeFrames(1, kGroup);
+    writeFrame(kGroup + 1, {{.voxels = test::cloud(60)}});
+  }
+  void makeQuick() const { writeFrames(kGroup + 1, kGroup + 1); }
+  [[nodiscard]] Words wordsTo(const std::string& output) const {
+    return {at("in.@.vdb"), at(output), "--device",  "cpu", "--representation", "voxels",
+            "--psnr",       "40",       "--threads", "1",   "--progress",       "json"};
+  }
+  [[nodiscard]] test::ProgramRun resumed() const {
+    Words words = wordsTo("out.esvr");
+    words.emplace_back("--resume");
+    return vdb2esvr(words);
+  }
+};
+
+constexpr const char* kWithoutTheLast = "\"frames_done\":16";
+
+TEST_F(SlowLastFrame, isConvertedAfterTheProgramWasKilled) {
   std::string command = std::string(VDB2ESVR);
-  for (const std::string& word : commandFor("out.esvr")) command += " '" + word + "'";
+  for (const std::string& word : wordsTo("out.esvr")) command += " '" + word + "'";
   const std::string log = "'" + at("log") + "'";
   const auto killed = test::runProgram(
-      "/bin/sh",
-      {"-c", "touch " + log + "; " + command + " 2>" + log + " & until grep -q 'frames_done\":2' " +
-                 log + "; do sleep 0.01; done; sleep 0.2; kill -9 $!; wait $!"});
+      "/bin/sh", {"-c", "touch " + log + "; " + command + " 2>" + log + " & until grep -q '" +
+                            kWithoutTheLast + "' " + log +
+                            "; do sleep 0.01; done; sleep 0.2; kill -9 $!; wait $!"});
   EXPECT_EQ(killed.exitCode, 128 + 9);
   EXPECT_TRUE(fs::exists(at("out.esvr.partial")));
-  writeFrames(3, 3);
-  Words again = commandFor("out.esvr");
-  again.emplace_back("--resume");
-  const auto run = vdb2esvr(again);
+  makeQuick();
+  ASSERT_EQ(vdb2esvr(wordsTo("whole.esvr")).exitCode, 0);
+  const auto run = resumed();
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
 }
 
-TEST_F(OneFile, keepsItsCompleteGroupsAfterAnInterruption) {
-  writeFrames(1, 2);
-  writeFrame(3, {{.voxels = test::cloud(30)}});  // it takes seconds
-  Words words{at("in.@.vdb"),     at("out.esvr"), "--gop",      "2",
-              "--device",         "cpu",          "--threads",  "1",
-              "--representation", "ellipsoids",   "--progress", "json"};
-  const auto stopped = runInterrupted(VDB2ESVR, words, "\"frames_done\":2");
+TEST_F(SlowLastFrame, leavesTheCompleteGroupsWhereItIsInterrupted) {
+  const auto stopped = runInterrupted(VDB2ESVR, wordsTo("out.esvr"), kWithoutTheLast);
   EXPECT_EQ(stopped.exitCode, 1);
-  EXPECT_THAT(stopped.err, HasSubstr("interrupted; 2 of 3 frames are complete, and --resume"));
+  EXPECT_THAT(stopped.err, HasSubstr("interrupted; 16 of 17 frames are complete, and --resume"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial"));
-  writeFrames(3, 3);
-  words.emplace_back("--resume");
-  const auto run = vdb2esvr(words);
+  makeQuick();
+  const auto run = resumed();
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("\"kept\""));
-  EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 3));
+  EXPECT_EQ(numbersIn("out.esvr").size(), std::size_t(kGroup + 1));
 }
 
 TEST_F(OneFile, isReplacedWhereForcedOnly) {
@@ -264,7 +282,7 @@ TEST_F(OneFile, isReplacedWhereForcedOnly) {
 
 TEST_F(OneFile, comesBackByFrames) {
   writeFrames(1, 6);
-  ASSERT_EQ(convert({"--gop", "2"}).exitCode, 0);
+  ASSERT_EQ(convert().exitCode, 0);
   const auto run = esvr2vdb(
       {at("out.esvr"), at("back.##.vdb"), "--frames", "5,2", "--reference", at("in.@.vdb")});
   ASSERT_EQ(run.exitCode, 0) << run.err;
@@ -283,7 +301,8 @@ TEST_F(OneFile, comesBackByFrames) {
 
 TEST_F(OneFile, isListedByFrames) {
   writeFrames(1, 3);
-  ASSERT_EQ(convert({"--gop", "2"}).exitCode, 0);
+  writeFrame(3, {{.voxels = test::softBall({}), .map = test::InputMap::kRotated}});
+  ASSERT_EQ(convert().exitCode, 0);
   const auto run = esvr2vdb({"--list", at("out.esvr")});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("format 1.3"), HasSubstr("3 frames in 2 groups"),
@@ -292,7 +311,7 @@ TEST_F(OneFile, isListedByFrames) {
 
 TEST_F(OneFile, isCheckedFrameByFrame) {
   writeFrames(1, 4);
-  ASSERT_EQ(convert({"--gop", "2"}).exitCode, 0);
+  ASSERT_EQ(convert().exitCode, 0);
   EXPECT_THAT(esvr2vdb({"--check", at("out.esvr")}).out, HasSubstr("out.esvr: OK"));
   damage("out.esvr", SequenceReader(at("out.esvr")).frames()[3].offset + 60);
   const auto run = esvr2vdb({"--check", at("out.esvr")});
@@ -341,53 +360,20 @@ class MovingCloud : public OneFile {
     words.insert(words.end(), more.begin(), more.end());
     return vdb2esvr(words);
   }
-  /// The mean PSNR of the changes between frames.
-  [[nodiscard]] double temporalPsnrOf(const std::string& name) const {
-    SequenceReader reader(at(name));
-    SparseVolume before, beforeIn;
-    double sum = 0.0;
-    for (const SequenceFrame& frame : reader.frames()) {
-      SparseVolume in =
-          readGrid(at("in." + std::to_string(frame.number) + ".vdb"), "density").volume;
-      SparseVolume out = decodeGrid(reader.read(frame.number).grids.at(0));
-      if (frame.number > 1) sum += temporalPsnr({beforeIn, in}, {before, out});
-      before = std::move(out), beforeIn = std::move(in);
-    }
-    return sum / double(reader.frames().size() - 1);
-  }
 };
 
 TEST_F(MovingCloud, takesFewerBytesThanFramesOfTheirOwn) {
-  ASSERT_EQ(convertTo("alone.esvr", {"--gop", "1"}).exitCode, 0);
+  ASSERT_EQ(convertTo("alone.@.esvr", {}).exitCode, 0);
   ASSERT_EQ(convertTo("out.esvr", {"--report", at("r.json")}).exitCode, 0);
-  EXPECT_LT(1.5 * double(sizeOf("out.esvr")), double(sizeOf("alone.esvr")));
+  double alone = 0.0;
+  for (int frame = 1; frame <= 6; ++frame)
+    alone += double(sizeOf("alone." + std::to_string(frame) + ".esvr"));
+  EXPECT_LT(1.5 * double(sizeOf("out.esvr")), alone);
   SequenceReader reader(at("out.esvr"));
   for (const SequenceFrame& frame : reader.frames())
     EXPECT_EQ(frame.dependsOnPrevious, frame.number > 1) << frame.number;
   for (const Json& frame : Json::parse(bytesOf("r.json"))["frames"])
     EXPECT_GE(frame["grids"][0]["psnr_box"].get<double>(), 40.0);
-}
-
-TEST_F(MovingCloud, isSteadierWhereAsked) {
-  ASSERT_EQ(convertTo("0.esvr", {"--steadiness", "0"}).exitCode, 0);
-  ASSERT_EQ(convertTo("1.esvr", {"--steadiness", "1"}).exitCode, 0);
-  EXPECT_LT(sizeOf("0.esvr"), sizeOf("1.esvr"));
-  EXPECT_LT(temporalPsnrOf("0.esvr"), temporalPsnrOf("1.esvr"));
-  EXPECT_EQ(convertTo("2.esvr", {"--steadiness", "1.5"}).exitCode, 2);
-}
-
-TEST_F(OneFile, needsASequenceForItsOptions) {
-  writeFrames(1, 1);
-  for (const std::string output : {"out.@.esvr", "out.esvr"}) {
-    const auto run =
-        vdb2esvr({at(output == "out.esvr" ? "in.1.vdb" : "in.@.vdb"), at(output), "--gop", "4"});
-    EXPECT_EQ(run.exitCode, 2);
-    EXPECT_THAT(run.err, HasSubstr("--gop needs a sequence"));
-  }
-  EXPECT_THAT(vdb2esvr({at("in.1.vdb"), at("out.esvr"), "--steadiness", "0"}).err,
-              HasSubstr("--steadiness needs a sequence"));
-  EXPECT_EQ(convert({"--gop", "0"}).exitCode, 2);
-  EXPECT_THAT(outputs(), IsEmpty());
 }
 
 }  // namespace

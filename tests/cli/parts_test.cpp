@@ -1,6 +1,5 @@
-// Plan: a fit in chunks gives the same bytes in one run, in a run that was interrupted or killed and
-// continued, and by several processes and a merge. A folder of another run, of damaged or missing
-// parts, or of a running process is refused.
+// Plan: a fit in chunks gives the same bytes in one run and in a run that was interrupted or killed
+// and continued. A folder of another run, of damaged parts, or of a running process is refused.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 class Parts : public test::FolderTest {
  protected:
@@ -43,6 +43,15 @@ class Parts : public test::FolderTest {
     EXPECT_EQ(test::readText(at(name)), test::readText(at("one.esvr")));
     EXPECT_FALSE(fs::exists(at(name) + ".parts"));
   }
+  /// Interrupts a run that keeps its parts.
+  test::ProgramRun stopWithParts() const {
+    auto stopped =
+        test::runInterrupted(VDB2ESVR, argumentsFor("out.esvr", {"--resume", "--progress", "json"}),
+                             "\"parts_done\":3,");
+    EXPECT_EQ(stopped.exitCode, 1);
+    EXPECT_FALSE(anyPart().empty());
+    return stopped;
+  }
   /// A result in the folder of finished parts.
   [[nodiscard]] fs::path anyPart() const {
     for (const auto& entry : fs::directory_iterator(at("out.esvr.parts")))
@@ -51,47 +60,20 @@ class Parts : public test::FolderTest {
   }
 };
 
-TEST_F(Parts, andAMergeGiveTheBytesOfOneRun) {
-  for (const char* part : {"1/3", "2/3", "3/3"}) {
-    const auto made = run("out.esvr", {"--part", part});
-    EXPECT_EQ(made.exitCode, 0) << made.err;
-    EXPECT_THAT(made.err, HasSubstr("--merge writes"));
-  }
-  EXPECT_FALSE(fs::exists(at("out.esvr")));
-  const auto merged = run("out.esvr", {"--merge"});
-  EXPECT_EQ(merged.exitCode, 0) << merged.err;
-  expectSameBytes("out.esvr");
-}
-
 TEST_F(Parts, ofAnInterruptedRunAreUsedAgain) {
-  const auto stopped = test::runInterrupted(
-      VDB2ESVR, argumentsFor("out.esvr", {"--resume", "--progress", "json"}), "\"parts_done\":3,");
-  EXPECT_EQ(stopped.exitCode, 1);
+  const auto stopped = stopWithParts();
   EXPECT_THAT(stopped.err, HasSubstr("the same command continues"));
-  EXPECT_FALSE(anyPart().empty());
   EXPECT_FALSE(fs::exists(at("out.esvr")));
   const auto resumed = run("out.esvr", {"--resume"});
   EXPECT_EQ(resumed.exitCode, 0) << resumed.err;
   expectSameBytes("out.esvr");
 }
 
-TEST_F(Parts, stayWhereAnInterruptedRunWritesItsBestResult) {
-  const auto stopped = test::runInterrupted(
-      VDB2ESVR, argumentsFor("out.esvr", {"--resume", "--on-cancel", "keep", "--progress", "json"}),
-      "\"parts_done\":3,");
-  EXPECT_EQ(stopped.exitCode, 1);
-  EXPECT_TRUE(fs::exists(at("out.esvr")));
-  EXPECT_FALSE(anyPart().empty());
-  EXPECT_EQ(run("out.esvr", {"--resume", "--force"}).exitCode, 0);
-  expectSameBytes("out.esvr");
-}
-
 TEST_F(Parts, ofAnotherFitAreNotNamedByARunThatKeepsNone) {
   fs::create_directory(at("out.esvr.parts"));
   const auto stopped = test::runInterrupted(
-      VDB2ESVR, argumentsFor("out.esvr", {"--on-cancel", "discard", "--progress", "json"}),
-      "\"parts_done\":3,");
-  EXPECT_THAT(stopped.err, HasSubstr("nothing was written"));
+      VDB2ESVR, argumentsFor("out.esvr", {"--progress", "json"}), "\"parts_done\":3,");
+  EXPECT_THAT(stopped.err, AllOf(HasSubstr("interrupted"), Not(HasSubstr("out.esvr.parts"))));
 }
 
 TEST_F(Parts, areReportedAsJson) {
@@ -109,50 +91,32 @@ TEST_F(Parts, areReportedAsJson) {
   EXPECT_NEAR(fraction, 1.0, 1e-9);
 }
 
-TEST_F(Parts, areMergedOnlyIfAllAreThere) {
-  const auto none = run("out.esvr", {"--merge"});
-  EXPECT_EQ(none.exitCode, 3);
-  EXPECT_THAT(none.err, HasSubstr("there is no"));
-  EXPECT_EQ(run("out.esvr", {"--part", "1/1"}).exitCode, 0);
-  fs::remove(anyPart());
-  const auto merged = run("out.esvr", {"--merge"});
-  EXPECT_EQ(merged.exitCode, 3);
-  EXPECT_THAT(merged.err, AllOf(HasSubstr("out.esvr.parts is not complete"), HasSubstr("missing")));
-  EXPECT_FALSE(fs::exists(at("out.esvr")));
-  EXPECT_EQ(run("out.esvr", {"--part", "1/1"}).exitCode, 0);
-  EXPECT_EQ(run("out.esvr", {"--merge"}).exitCode, 0);
-  expectSameBytes("out.esvr");
-}
-
 TEST_F(Parts, thatAreDamagedAreRefused) {
-  EXPECT_EQ(run("out.esvr", {"--part", "1/1"}).exitCode, 0);
+  stopWithParts();
   fs::resize_file(anyPart(), 100);
-  const auto merged = run("out.esvr", {"--merge"});
-  EXPECT_EQ(merged.exitCode, 3);
-  EXPECT_THAT(merged.err, HasSubstr("is damaged; remove it"));
+  const auto resumed = run("out.esvr", {"--resume"});
+  EXPECT_EQ(resumed.exitCode, 3);
+  EXPECT_THAT(resumed.err, HasSubstr("is damaged; remove it"));
 }
 
 TEST_F(Parts, ofAnotherRunAreRefusedWithBothNames) {
-  EXPECT_EQ(run("out.esvr", {"--part", "1/2"}).exitCode, 0);
-  const auto otherOption = run("out.esvr", {"--part", "2/2", "--seed", "5"});
+  stopWithParts();
+  const auto otherOption = run("out.esvr", {"--resume", "--seed", "5"});
   EXPECT_EQ(otherOption.exitCode, 3);
   EXPECT_THAT(otherOption.err, HasSubstr("its seed is 1, not 5"));
   fs::copy_file(at("in.vdb"), at("other.vdb"));
-  auto arguments = argumentsFor("out.esvr", {"--merge"});
+  auto arguments = argumentsFor("out.esvr", {"--resume"});
   arguments[0] = at("other.vdb");
   const auto otherInput = test::vdb2esvr(arguments);
   EXPECT_EQ(otherInput.exitCode, 3);
   EXPECT_THAT(otherInput.err, AllOf(HasSubstr("in.vdb, not "), HasSubstr("other.vdb")));
 }
 
-TEST_F(Parts, areNotUsedByTwoRunsThatDoNotShareThem) {
+TEST_F(Parts, areNotUsedByTwoRunsAtATime) {
   const PartStore store(at("out.esvr.parts"), {}, PartStore::Access::kAlone);
-  for (const auto& job :
-       std::vector<std::vector<std::string>>{{"--resume"}, {"--part", "1/2"}, {"--merge"}}) {
-    const auto second = run("out.esvr", job);
-    EXPECT_EQ(second.exitCode, 1);
-    EXPECT_THAT(second.err, HasSubstr("another process uses"));
-  }
+  const auto second = run("out.esvr", {"--resume"});
+  EXPECT_EQ(second.exitCode, 1);
+  EXPECT_THAT(second.err, HasSubstr("another process uses"));
 }
 
 TEST_F(Parts, cannotBeKeptOnAFullDisk) {
@@ -163,25 +127,6 @@ TEST_F(Parts, cannotBeKeptOnAFullDisk) {
   EXPECT_THAT(full.err, AllOf(HasSubstr("out.esvr.parts/"), HasSubstr("File too large")));
   EXPECT_EQ(run("out.esvr", {"--resume"}).exitCode, 0);
   expectSameBytes("out.esvr");
-}
-
-TEST_F(Parts, ofAFitInOneChunkAreNone) {
-  const auto made = run("out.esvr", {"--chunk-voxels", "1000000", "--part", "1/2"});
-  EXPECT_EQ(made.exitCode, 2);  // the option was given twice
-  auto arguments = argumentsFor("out.esvr", {"--part", "1/2"});
-  arguments[7] = "1000000";
-  const auto whole = test::vdb2esvr(arguments);
-  EXPECT_EQ(whole.exitCode, 0) << whole.err;
-  EXPECT_THAT(whole.err, HasSubstr("there are no parts"));
-}
-
-TEST_F(Parts, haveNumbersFromOneToTheirCount) {
-  for (const char* part : {"0/2", "3/2", "1", "a/b", "1/", "/2", "1/2/3", "-1/2"}) {
-    const auto made = run("out.esvr", {"--part", part});
-    EXPECT_EQ(made.exitCode, 2) << part;
-    EXPECT_THAT(made.err, HasSubstr("--part must be K/N"));
-  }
-  EXPECT_EQ(run("out.esvr", {"--part", "1/2", "--merge"}).exitCode, 2);
 }
 
 TEST_F(Parts, keepFilesOfOthersInTheirFolder) {

@@ -132,7 +132,7 @@ class ReportDoc : public test::FolderTest {
 TEST_F(ReportDoc, namesTheKeysOfAConversion) {
   test::writeMixedInput(at("in.vdb"), {{.voxels = test::softBall({})}});
   test::writeInput(at("cloud.vdb"), {{.voxels = test::cloud(12)}});
-  const std::vector<std::string> quick{"--device", "cpu", "--hits", "--iterations", "60"};
+  const std::vector<std::string> quick{"--device", "cpu", "--iterations", "60"};
   const auto convert = [&](const char* input, std::vector<std::string> more) {
     more.insert(more.begin(), {at(input), at("out.esvr")});
     more.insert(more.end(), quick.begin(), quick.end());
@@ -146,7 +146,7 @@ TEST_F(ReportDoc, namesTheKeysOfAConversion) {
   test::writeVectorInput(at("wind.vdb"), {.voxels = test::softBall({})});
   convert("wind.vdb", {"--count", "30", "--representation", "ellipsoids"});
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--paper", "epochs=28,points=60", "--count", "40",
-                 "--device", "cpu", "--hits"});
+                 "--device", "cpu"});
 
   expectTable(all_, tableAfter(document_, "## The report of a conversion"),
               {"error", "grids", "seconds"}, "report");
@@ -234,20 +234,6 @@ TEST_F(ComparisonDoc, namesTheKeysOfATable) {
   EXPECT_EQ(keysOf(all_["rows"]), without(keysOf(row), {"device_bytes", "lpips"}));
   for (const char* object : {"encode", "decode", "search"})
     expectNamed(all_["rows"][object], row.at(object), object);
-}
-
-TEST_F(ComparisonDoc, namesTheKeysOfStability) {
-  add(ESVR_COMPARE, {"stability", at("in.esvr"), "--device", "cpu"});
-  const Table report = tableAfter(document_, "The report of `stability`");
-  expectTable(all_, report, {"grids"}, "stability");
-  const Table objects = tableAfter(document_, "The objects of a grid in the report of `stability`");
-  Keys keys = namedIn(report.at("grids"));
-  keys.merge(keysOf(objects));
-  EXPECT_EQ(keysOf(all_["grids"]), without(keys, kNoKeys));
-  for (const char* object : {"difficulties", "devices"})
-    expectNamed(all_["grids"][object], objects.at(object), object);
-  expectNamed(all_["grids"]["devices"]["worst"], "`brick`, `voxel`, `max_difference`, `bound`",
-              "worst");
 }
 
 TEST_F(ComparisonDoc, namesTheKeysOfCurves) {

@@ -22,7 +22,6 @@ using Json = nlohmann::json;
 using test::softBall;
 using testing::AllOf;
 using testing::HasSubstr;
-using testing::Not;
 using Arguments = std::vector<std::string>;
 
 constexpr double kStandardPsnr = 40.0;
@@ -78,13 +77,6 @@ TEST_F(SharingGrids, areNamedByTheReportAndTheSummary) {
   EXPECT_THAT(run_.out, AllOf(HasSubstr("heat: refers to density"), HasSubstr("bytes smaller")));
 }
 
-TEST_F(SharingGrids, areThoseThatAreNamed) {
-  const Json report = convert({"--share", "density,far"});
-  EXPECT_TRUE(report["grids"][1]["shared"].is_null());
-  EXPECT_FALSE(readEsvr(out()).grids[1].reference);
-  EXPECT_THAT(run_.out, Not(HasSubstr("refers to heat")));
-}
-
 TEST_F(SharingGrids, areReadOneByOne) {
   convert();
   const std::string back = folder_ / "back.vdb", all = folder_ / "all.vdb";
@@ -99,9 +91,7 @@ TEST_F(SharingGrids, areReadOneByOne) {
 }
 
 TEST_F(SharingGrids, thatDoNotExistAreRefused) {
-  for (const Arguments& options : {Arguments{"--share", "density,smoke"},
-                                   {"--psnr", "smoke=40"},
-                                   {"--max-error", "smoke=1%"}}) {
+  for (const Arguments& options : {Arguments{"--psnr", "smoke=40"}, {"--max-error", "smoke=1%"}}) {
     const auto run = this->run(options);
     EXPECT_EQ(run.exitCode, 3) << options[0];
     EXPECT_THAT(run.err, AllOf(HasSubstr("smoke"), HasSubstr("\"density\", \"heat\"")));
@@ -112,7 +102,6 @@ TEST_F(SharingGrids, keepToASizeApart) {
   const Json report = convert({"--size", "2000"});
   EXPECT_LE(outBytes(), 2000u);
   EXPECT_TRUE(report["output"]["bytes_separate"].is_null());
-  EXPECT_EQ(run({"--size", "2000", "--share", "density"}).exitCode, 2);
 }
 
 TEST_F(SharingGrids, takeFewerBytesInTheFramesOfAFile) {

@@ -50,8 +50,8 @@ class Twins : public testing::Test {
   test::ProgramRun run_;
 };
 
-const std::vector<std::string> kQuick{"--count", "30", "--iterations",     "60",
-                                      "--kappa", "0",  "--representation", "ellipsoids"};
+const std::vector<std::string> kQuick{"--count",          "30",        "--iterations", "60",
+                                      "--representation", "ellipsoids"};
 
 /// Three grids, of which the first and the last one have the same voxels.
 std::vector<InputGrid> twoAlike() {
@@ -128,8 +128,7 @@ TEST_F(Twins, ofATwinAreNamedAfterTheFirst) {
 // ---- with a size
 
 std::vector<std::string> sized(std::uint64_t bytes) {
-  return {"--size", std::to_string(bytes), "--iterations", "60", "--kappa",
-          "0",      "--representation",    "ellipsoids"};
+  return {"--size", std::to_string(bytes), "--iterations", "60", "--representation", "ellipsoids"};
 }
 
 TEST_F(Twins, leaveTheirShareToTheOthers) {

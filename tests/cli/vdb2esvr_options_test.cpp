@@ -109,13 +109,6 @@ TEST_F(Vdb2EsvrOption, presetsTakeMoreAndMoreIterations) {
   EXPECT_LT(last("standard"), last("high"));
 }
 
-TEST_F(Vdb2EsvrOption, kappaIsThatOfTheKernel) {
-  const Json given = quick({"--count", "5", "--kappa", "3.5"}), free = quick({"--count", "5"});
-  EXPECT_EQ(given["kernel"]["kappa"], 3.5);
-  EXPECT_EQ(given["fit"]["kappa_learned"], false);
-  EXPECT_EQ(free["fit"]["kappa_learned"], true);
-}
-
 TEST_F(Vdb2EsvrOption, boxIsWherePsnrIsTaken) {
   const Json metrics = quick({"--count", "5", "--box", "-20,-20,-20,20,20,19"})["metrics"];
   EXPECT_EQ(metrics["box_voxels"], 41.0 * 41.0 * 40.0);
@@ -137,13 +130,6 @@ TEST_F(Vdb2EsvrOption, storageIsCompactOrFloat32) {
   EXPECT_TRUE(compact["compact"].is_object());
   EXPECT_TRUE(floats["compact"].is_null());
   EXPECT_LT(compact["bytes"].get<int>(), floats["bytes"].get<int>());
-}
-
-TEST_F(Vdb2EsvrOption, storageLossBuysBytes) {
-  const Json little = quick({"--count", "40", "--storage-loss", "0.02"});
-  const Json much = quick({"--count", "40", "--storage-loss", "3"});
-  EXPECT_LE(little["compact"]["loss_db"].get<double>(), 0.02 + 1e-3);
-  EXPECT_LT(much["bytes"].get<int>(), little["bytes"].get<int>());
 }
 
 TEST_F(Vdb2EsvrOption, devicesAreTakenAsNamed) {

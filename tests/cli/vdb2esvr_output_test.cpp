@@ -58,9 +58,8 @@ TEST_F(Vdb2Esvr, refusesToWriteOverItsInput) {
 TEST_F(Vdb2Esvr, leavesNothingOnAFullDisk) {
   test::writeText(folder_ / "old.esvr", "precious");
   for (const std::string name : {"out.esvr", "old.esvr"}) {
-    const auto run =
-        test::runOnFullDisk(std::string(VDB2ESVR) + " " + in() + " " + (folder_ / name).string() +
-                            " --force --iterations 10 --kappa 0");
+    const auto run = test::runOnFullDisk(std::string(VDB2ESVR) + " " + in() + " " +
+                                         (folder_ / name).string() + " --force --iterations 10");
     EXPECT_EQ(run.exitCode, 1);
     EXPECT_THAT(run.err, AllOf(HasSubstr(name), HasSubstr("File too large")));
   }
@@ -80,28 +79,20 @@ TEST_F(Vdb2Esvr, keepsTheFileWhereOnlyTheTableCannotBePrinted) {
 /// A fit of a minute, which is interrupted after its first message about progress.
 class Interrupted : public Vdb2Esvr {
  protected:
-  [[nodiscard]] test::ProgramRun interrupted(const std::string& onCancel) const {
+  [[nodiscard]] test::ProgramRun interrupted() const {
     test::writeInput(in(), {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
-    return test::runInterrupted(VDB2ESVR,
-                                {in(), out(), "--seconds", "60", "--kappa", "0", "--representation",
-                                 "ellipsoids", "--on-cancel", onCancel, "-v"},
-                                " left\n");
+    return test::runInterrupted(
+        VDB2ESVR, {in(), out(), "--seconds", "60", "--representation", "ellipsoids", "-v"},
+        " left\n");
   }
 };
 
 TEST_F(Interrupted, writesTheBestSoFarAndEndsWithCodeOne) {
-  const auto run = interrupted("keep");
+  const auto run = interrupted();
   EXPECT_EQ(run.exitCode, 1);
   EXPECT_THAT(run.err, HasSubstr("out.esvr has the best result so far, without grid \"heat\""));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
   EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
-}
-
-TEST_F(Interrupted, writesNothingWhereAskedTo) {
-  const auto run = interrupted("discard");
-  EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, HasSubstr("nothing was written"));
-  EXPECT_THAT(folder_.names(), ElementsAre("in.vdb"));
 }
 
 TEST_F(Vdb2Esvr, SlowEndsWithinTwoSecondsOfASignal) {

@@ -47,7 +47,7 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{{"--max-error", "1%", "--paper", "epochs=9"}, 2, "--paper"},
         Refusal{{"--max-error", "1%", "--preset", "paper", "--iterations", "9"}, 2, "paper"},
         Refusal{{"--lossless", "--max-error", "1%"}, 2, "--max-error"},
-        Refusal{{"--paper", "default", "--kappa", "2"}, 2, "--kappa"},
+        Refusal{{"--share", "density"}, 2, "--share"},
         Refusal{{"--paper", "default", "--iterations", "9"}, 2, "--iterations"},
         Refusal{{"--paper", "default", "--preset", "high"}, 2, "--preset"},
         Refusal{{"--paper", "default", "--size", "9KB"}, 2, "--paper"},

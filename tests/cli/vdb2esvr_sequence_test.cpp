@@ -343,8 +343,6 @@ INSTANTIATE_TEST_SUITE_P(
         BadSequence{{"in.####.vdb", "out.####.png"}, 2, "must end in .esvr"},
         BadSequence{{"in.@.vdb", "out.@.esvr"}, 3, "has another number of digits"},
         BadSequence{{"no.####.vdb", "out.####.esvr"}, 3, "no file matches"},
-        BadSequence{{"in.####.vdb", "out.####.esvr", "--part", "1/2"}, 2, "--part is for one"},
-        BadSequence{{"in.####.vdb", "out.####.esvr", "--merge"}, 2, "--merge is for one"},
         BadSequence{{"in.####.vdb", "out.####.esvr", "--resume", "-f"}, 2, "choose one"}));
 
 }  // namespace

@@ -63,8 +63,8 @@ TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
 }
 
 TEST_F(Vdb2Esvr, keepsToTheSizeAskedFor) {
-  const auto run = vdb2esvr({in(), out(), "--size", "1.5KB", "--iterations", "60", "--kappa", "0",
-                             "--representation", "ellipsoids"});
+  const auto run = vdb2esvr(
+      {in(), out(), "--size", "1.5KB", "--iterations", "60", "--representation", "ellipsoids"});
   EXPECT_EQ(run.exitCode, 0) << run.err;
   EXPECT_LE(std::filesystem::file_size(out()), 1500u);
   EXPECT_GE(std::filesystem::file_size(out()), 1470u);

@@ -9,11 +9,16 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <cmath>
+#include <utility>
+#include <vector>
+
 #include "convert/volumes.h"
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "esvr/temporal_metrics.h"
 
 namespace esvr {
 namespace {
@@ -99,8 +104,8 @@ TEST(ConvertToPsnr, ReachesItForFramesInFewerBytes) {
   ConvertOptions options = optionsFor(PsnrGoal{35.0});
   options.representation = Representation::kVoxels;
   const StoredGrid before = convertVolume({kDescriptor, first}, options).grid;
-  for (const double steadiness : {0.0, 1.0}) {
-    options.steadiness = steadiness;
+  for (const bool keepsPastErrors : {false, true}) {
+    options.keepsPastErrors = keepsPastErrors;
     options.previous = nullptr;
     const StoredGrid alone = convertVolume({kDescriptor, second}, options).grid;
     options.previous = &before;
@@ -108,6 +113,31 @@ TEST(ConvertToPsnr, ReachesItForFramesInFewerBytes) {
     EXPECT_GE(psnrOf(second, frame), 35.0);
     EXPECT_LT(bytesInFrame(frame, &before), bytesAdded(alone));
   }
+}
+
+/// Four frames of waves that move by a third of a voxel a frame.
+TEST(ConvertToPsnr, LetsFramesFlickerLessWhereTheyKeepPastErrors) {
+  std::vector<SparseVolume> frames(4, test::smoothVolume());
+  for (std::size_t f = 0; f < frames.size(); ++f)
+    for (std::size_t i = 0; i < frames[f].values.size(); ++i)
+      frames[f].values[i] *= 1.0f + 0.3f * std::sin(0.9f * (float(i % 8) - float(f) / 3.0f));
+  ConvertOptions options = optionsFor(PsnrGoal{40.0});
+  options.representation = Representation::kVoxels;
+  const auto change = [&](bool keepsPastErrors) {
+    options.keepsPastErrors = keepsPastErrors;
+    std::vector<StoredGrid> made;
+    double sum = 0.0;
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+      options.previous = f > 0 ? &made.back() : nullptr;
+      StoredGrid grid = convertVolume({kDescriptor, frames[f]}, options).grid;
+      if (f > 0)
+        sum +=
+            temporalPsnr({frames[f - 1], frames[f]}, {decodeGrid(made.back()), decodeGrid(grid)});
+      made.push_back(std::move(grid));
+    }
+    return sum / double(frames.size() - 1);
+  };
+  EXPECT_GT(change(true), change(false));
 }
 
 TEST(ConvertToPsnr, TakesNoMoreEllipsoidsThanAllowed) {

@@ -1,6 +1,7 @@
 // Plan: every part is run once, and its result stands in its place, on one device and on several. Two
 // devices work at the same time. An error of a part ends the run. If a device fails, the others do
-// its parts, and this is told once; where none is left, the run fails.
+// its parts, and this is told once; where none is left, the run fails. Results in a store are not
+// fitted again.
 
 #include "esvr/device_workers.h"
 
@@ -13,6 +14,7 @@
 
 #include "distribute/fake_parts.h"
 #include "esvr/error.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
@@ -44,6 +46,28 @@ TEST(DeviceWorkers, EndWithTheErrorOfAPart) {
       EXPECT_EQ(parts.fits()[4], 0);
     }
   }
+}
+
+TEST(DeviceWorkers, FitOnlyWhatAStoreDoesNotHave) {
+  const test::TemporaryFolder folder;
+  PartStore store(folder / "parts", {}, PartStore::Access::kAlone);
+  store.put(test::keyOfPart(1), test::resultOfPart(1));
+  for (const int first : {1, 0}) {
+    const test::FakeParts parts(4);
+    DeviceWorkers workers(std::vector<Device>(2), {}, &store);
+    EXPECT_EQ(workers.run(parts), test::resultsOfParts(4));
+    EXPECT_EQ(parts.fits(), (std::vector<int>{first, 0, first, first}));
+  }
+}
+
+TEST(DeviceWorkers, StoreNothingThatWasCancelled) {
+  const test::TemporaryFolder folder;
+  PartStore store(folder / "parts", {}, PartStore::Access::kAlone);
+  test::FakeParts parts(3);
+  parts.complete = false;
+  DeviceWorkers workers({Device{}}, {}, &store);
+  EXPECT_EQ(workers.run(parts), test::resultsOfParts(3));
+  EXPECT_FALSE(store.find(test::keyOfPart(0)).has_value());
 }
 
 /// Parts of which one device can fit none.

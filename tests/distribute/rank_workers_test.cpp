@@ -70,8 +70,8 @@ TEST(RankWorkers, UseAndFillAStore) {
   const FakeParts parts(5);
   EXPECT_EQ(RankWorkers(ranks, {Device{}}, &store).run(parts), resultsOfParts(5));
   EXPECT_THAT(parts.fits(), ElementsAre(1, 0, 0, 0, 1));
-  EXPECT_TRUE(store.contains(keyOfPart(4)));
-  EXPECT_FALSE(store.contains(keyOfPart(1)));
+  EXPECT_TRUE(store.find(keyOfPart(4)).has_value());
+  EXPECT_FALSE(store.find(keyOfPart(1)).has_value());
 }
 
 TEST(RankWorkers, EndWhereTheyDoNotAgree) {

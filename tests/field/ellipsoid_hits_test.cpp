@@ -68,20 +68,6 @@ TEST(AverageHits, AreThoseOfACountOverEveryVoxel) {
   EXPECT_NEAR(averageHits(field), countedOverAll(field), 1e-3);
 }
 
-TEST(CountHits, CountsInTheBricksAskedForOnly) {
-  const Field field =
-      test::randomField({.count = 30, .extent = 20, .smallest = 0.7, .aspect = 4.0});
-  const auto shapes = shapesOf(field);
-  const Coord corner{8, 0, 8};
-  double pairs = 0.0;
-  for (int v = 0; v < kBrickVoxels; ++v)
-    for (const Shape& s : shapes) pairs += holds(s, corner + voxelLocal(v)) ? 1.0 : 0.0;
-  const EllipsoidHits counted = countHits(field, std::array{corner, Coord{800, 0, 0}});
-  EXPECT_GT(pairs, 100.0);
-  EXPECT_NEAR(double(counted.voxelPairs), pairs, 1.0);
-  EXPECT_LE(counted.voxels, std::uint64_t(kBrickVoxels));
-}
-
 TEST(AverageHits, OfNothingAreNone) { EXPECT_EQ(averageHits(Field{}), 0.0); }
 
 }  // namespace

@@ -187,7 +187,6 @@ class ChunkedFit {
     result.field =
         exportField(all, {volume.origin, scene_.scale.scale, volume.background, kernel_});
     result.range = rangeOf(volume.background, scene_.scale);
-    result.kappaLearned = !options_.kappa;
     result.end = endAt(result.curve.back().psnrBox);
     result.wanted = plannedCount(options_, activeVoxels_);
     result.chunks = scene_.chunks.size();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "esvr/error.h"
+#include "esvr/field.h"
 #include "fit/empty_fit.h"
 #include "fit/paper/paper_field.h"
 #include "fit/paper/paper_run.h"
@@ -115,6 +116,7 @@ PaperFitResult fitByPaper(const SparseVolume& volume, const PaperFitOptions& opt
                fieldOf(population, kind, {volume.origin, target.scale, volume.background, {}}));
   fit.end = end;
   fit.signedIntensities = anyNegative(population);
+  record.hits = averageHits(fit.field);
   return {std::move(fit), std::move(record)};
 }
 

@@ -139,7 +139,7 @@ class Epochs {
     Population population = optimiser_.population();
     PruneRecord note{pass.epoch, population.size()};
     note.psnrBoxBefore = recordPoint().psnrBox;
-    if (run_.method.countHits) note.hitsBefore = hitsOf(population);
+    note.hitsBefore = averageHits(fieldOf(population, kindOf(run_.method), {}));
     const auto scores = pruneScores(population.ellipsoids, run_.method.score,
                                     {kindOf(run_.method), space_.voxels(), kFloorShare * range_});
     keepHighest(population, scores, keptBy(pass, population.size()));
@@ -147,10 +147,6 @@ class Epochs {
     note.after = population.size();
     note.psnrBoxAfter = recordPoint().psnrBox;
     record_.prunes.push_back(note);
-  }
-
-  [[nodiscard]] double hitsOf(const Population& population) const {
-    return averageHits(fieldOf(population, kindOf(run_.method), {}));
   }
 
   const TimedCurvePoint& recordPoint() {

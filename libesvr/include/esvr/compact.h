@@ -15,10 +15,9 @@
 namespace esvr {
 
 struct CompactOptions {
-  static constexpr double kDefaultLoss = 0.1;
-
-  /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32.
-  double loss = kDefaultLoss;
+  /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32. With
+  /// 0.1 dB, a file is hardly worse than its fit; 0.3 dB would save 2 to 11 % of the bytes.
+  double loss = 0.1;
   /// PSNR over the box, in dB, that the smallest result must reach. It replaces `loss`.
   std::optional<double> psnr{};
   /// Bytes that the ellipsoids of the best result may take. It replaces `loss` and `psnr`.

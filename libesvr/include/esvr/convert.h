@@ -85,8 +85,6 @@ enum class Storage {
 
 struct StorageOptions {
   Storage form = Storage::kCompact;
-  /// PSNR over the box, in dB, that kCompact may lose for a FitGoal. The other goals ignore it.
-  double loss = CompactOptions::kDefaultLoss;
   /// How active voxels are stored. For Activity::kAuto, a SizeGoal takes kNoMask where a simplified
   /// mask would take more than a quarter of the size, and kByValue where the thresholds of blocks
   /// would. Level sets that are stored as voxels always
@@ -105,9 +103,9 @@ struct ConvertOptions {
   /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal and a PsnrGoal, so that
   /// only the first frame of a group takes the time of a fit.
   const StoredGrid* previous = nullptr;
-  /// Weight of the error of the change since the previous frame, from 0 (least bytes) to 1 (least
-  /// flicker), if there is one. Voxels then keep a part of the errors of the previous frame.
-  double steadiness = 0.5;
+  /// Voxels keep a part of the errors of the previous frame, if there is one. Errors that stay in
+  /// their places flicker less, for a few bytes more. It is false where `previous` is another grid.
+  bool keepsPastErrors = true;
 };
 
 /// A volume and its other properties.

@@ -39,13 +39,6 @@ using Place = std::array<double, 3>;
 /// \throws MemoryExceeded  as for reachedBricks
 void evaluatePlaces(const Field& field, std::span<const Place> places, std::span<float> out);
 
-struct EllipsoidHits {
-  std::uint64_t voxelPairs = 0;  ///< pairs of an ellipsoid and a voxel in its support
-  std::uint64_t voxels = 0;      ///< voxels that lie in at least one support
-};
-/// \param corners  index corners of the bricks whose voxels count, multiples of 8
-[[nodiscard]] EllipsoidHits countHits(const Field& field, std::span<const Coord> corners);
-
 /// Average number of ellipsoids whose support contains a voxel, over the voxels that lie in at
 /// least one support (the paper's 'average ellipsoid hits'); 0 if there is no such voxel.
 [[nodiscard]] double averageHits(const Field& field);

@@ -86,7 +86,6 @@ struct FitResult {
   ValueRange range{};  ///< range of the volume's values, to which sums are clamped
   std::vector<TimedCurvePoint> curve;
   FitEnd end = FitEnd::kScheduleDone;
-  bool kappaLearned = false;  ///< true if kappa was fitted, false if it was given
   /// Wall-clock times. secondsSeed covers the seeding at the start, growth and relocation, and is
   /// not part of secondsOptimise.
   double secondsSeed = 0.0, secondsOptimise = 0.0;

@@ -80,7 +80,6 @@ struct PaperMethod {
   std::optional<std::size_t> keep;  ///< number that the last pass keeps, instead of its share
 
   PaperRates rates;
-  bool countHits = false;  ///< average ellipsoid hits are counted before each pruning
 };
 
 /// The same method with another number of epochs: everything that is given in epochs is scaled.
@@ -94,7 +93,7 @@ struct PruneRecord {
   std::uint32_t epoch = 0;
   std::size_t before = 0, after = 0;               ///< numbers of ellipsoids
   double psnrBoxBefore = 0.0, psnrBoxAfter = 0.0;  ///< PSNR of the sum over the box, dB
-  double hitsBefore = 0.0;                         ///< average ellipsoid hits; 0: not counted
+  double hitsBefore = 0.0;                         ///< averageHits (field.h)
 };
 
 /// The outcome of a run.
@@ -106,6 +105,7 @@ struct PaperRecord {
   std::size_t cloned = 0, split = 0;
   double firstGradient = 0.0;  ///< median gradient of the first densification
   std::vector<PruneRecord> prunes;
+  double hits = 0.0;  ///< averageHits (field.h) of the result, which the paper reports too
 };
 
 /// The options of a fit by the paper's method. `count` is the number of ellipsoids that the last

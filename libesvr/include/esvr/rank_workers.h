@@ -21,9 +21,6 @@ class RankWorkers : public PartRunner {
   std::vector<std::vector<std::byte>> run(const RoundParts& parts) override;
 
  private:
-  [[nodiscard]] std::vector<std::byte> findOrFit(const RoundParts& parts, std::size_t part,
-                                                 const Device& device);
-
   Ranks& ranks_;
   std::vector<Device> devices_;
   PartStore* store_;

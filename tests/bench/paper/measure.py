@@ -108,7 +108,7 @@ class Subject:
     def by_paper(self, name, kept_count, **keys):
         """A fit by the paper's method that keeps this number of ellipsoids."""
         keys = ",".join(f"{key.replace('_', '-')}={value}" for key, value in keys.items())
-        return self.convert(name, ["--paper", keys, "--count", kept_count, "--topology", "threshold", "--hits"])
+        return self.convert(name, ["--paper", keys, "--count", kept_count, "--topology", "threshold"])
 
 
 # Compressors of arrays
@@ -305,7 +305,7 @@ def ablation(options, name, count):
     table = subject.table("ablations", [*(file for file, _ in files.values()), "--rows", "none", *VIEWS])
     by_name = {row["name"]: row for row in rows_of(table["rows"])}
     return {key: {**by_name[file.name], "ellipsoids": report["grids"][0]["ellipsoids"],
-                  "hits": report["grids"][0]["fit"].get("hits")} for key, (file, report) in files.items()}
+                  "hits": (report["grids"][0]["paper"] or {}).get("hits")} for key, (file, report) in files.items()}
 
 
 def convergence(options, name, count):
