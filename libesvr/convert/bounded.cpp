@@ -19,7 +19,7 @@
 namespace esvr::convert {
 namespace {
 
-// docs/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
+// docs/figures/benchmarks.md, "Voxels or a residual within an error bound", has the sizes that follow.
 /// The ellipsoids of a grid with a residual get this fraction (1/4) of the bytes of its voxels.
 constexpr std::uint64_t kEllipsoidBytesDivisor = 4;
 /// Largest residualRatio() at which ellipsoids are fitted. The ratio of a whole volume without

@@ -11,7 +11,7 @@ namespace esvr::convert {
 /// The smaller of two grids: voxels, or ellipsoids with a residual. The ellipsoids get a quarter of
 /// the bytes of the voxels. The volume is fitted only if fits of a sample of bricks promise that
 /// this saves a part of the bytes (residualRatio()). Ellipsoids are smaller for smooth values and
-/// larger for noisy ones (docs/benchmarks.md, "Voxels or a residual within an error bound").
+/// larger for noisy ones (docs/figures/benchmarks.md, "Voxels or a residual within an error bound").
 [[nodiscard]] Conversion convertWithin(const Job& job, const BoundGoal& goal);
 
 /// A grid that holds the exact voxels and the exact active mask.

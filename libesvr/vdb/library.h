@@ -1,7 +1,7 @@
 #pragma once
 /// The functions of libesvr that need OpenVDB or NanoVDB, behind one interface, so that a process can
 /// load OpenVDB when it needs it for the first time. Debian's libopenvdb takes a process about 30 ms
-/// to load, most of the time of a short command (docs/benchmarks.md).
+/// to load, most of the time of a short command (docs/figures/benchmarks.md).
 ///
 /// A static libesvr has a library() that is linked with OpenVDB (linked_library.cpp). The programs
 /// and a shared libesvr have one that loads a module (loaded_library.cpp).

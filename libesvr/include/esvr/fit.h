@@ -57,7 +57,7 @@ struct FitOptions : CommonFitOptions {
   FitFor fitFor = FitFor::kVoxels;
   /// For FitFor::kDrawing: share of the iterations, 0 to 1, that compare at the voxels; the others
   /// compare between them. A larger share lowers the error at the voxels, and raises it between
-  /// them (docs/benchmarks.md, "Fits for drawing").
+  /// them (docs/figures/benchmarks.md, "Fits for drawing").
   double voxelShare = 0.25;
   std::optional<float> kappa;  ///< edge of the kernel; default: it is fitted with the ellipsoids
   /// The volume is a level set: voxels outside its bricks do not count.

@@ -1,6 +1,6 @@
 #pragma once
 /// Adds a part to a stored grid that it does not need, without changing its voxels, to measure what
-/// leaving the part out saves (docs/economy.md, `left_out` of the reports). Conversions never store
+/// leaving the part out saves (docs/figures/economy.md, `left_out` of the reports). Conversions never store
 /// such parts.
 ///
 /// Ellipsoids are stored in the order of their centers. The voxels stay the same bit for bit if the
