@@ -1,4 +1,4 @@
-# Packages for Debian and Ubuntu, one for each component of the installation (docs/packages.md). The
+# Packages for Debian and Ubuntu, one for each component of the installation (docs/library.md). The
 # preset `deb` sets ESVR_DEB, and `cpack` in its build folder makes the packages.
 if(NOT ESVR_DEB)
   return()

@@ -173,7 +173,7 @@ void addFileOptions(cli::po::options_description& options) {
   options.add_options()
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "convert this grid only; may be repeated; 'density[1]' is the second grid of that name "
-     "(the README has all rules)")
+     "(docs/convert.md has all rules)")
     ("keep", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "carry this grid unchanged instead of fitting it; may be repeated; with -g, in addition to the "
      "grids that -g names")

@@ -1,5 +1,5 @@
 #pragma once
-/// Scenes in messages (docs/view.md): what is drawn, with the options of esvr-render.
+/// Scenes in messages (docs/pictures.md): what is drawn, with the options of esvr-render.
 
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>

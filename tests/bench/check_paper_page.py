@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks docs/paper.md against the documents from which it takes our figures.
+"""Checks docs/figures/paper.md against the documents from which it takes our figures.
 
 Each row of its table "Figures of other documents" names a document, or DOCUMENT#HEADING for one of its sections, and the beginning
 of a row. Some row that begins so must have the figure as one of its cells or words. Exits with 1 and names the rows that do not agree.
@@ -8,7 +8,7 @@ import pathlib
 import re
 import sys
 
-DOCS = pathlib.Path(__file__).parents[2] / 'docs'
+DOCS = pathlib.Path(__file__).parents[2] / 'docs/figures'
 
 
 def cells(line):
@@ -45,9 +45,9 @@ def main():
     rows = claims()
     wrong = [row for row in rows if not holds(*row[1:])]
     for what, figure, place, beginning in wrong:
-        print(f'docs/paper.md: {what}: {place} has no row "{beginning}" with {figure}')
+        print(f'docs/figures/paper.md: {what}: {place} has no row "{beginning}" with {figure}')
     if not rows:
-        print('docs/paper.md: the table "Figures of other documents" has no row')
+        print('docs/figures/paper.md: the table "Figures of other documents" has no row')
     return 1 if wrong or not rows else 0
 
 

@@ -1,21 +1,19 @@
 #!/usr/bin/env python3
-"""Measures stiff and extreme cases, and writes docs/stability.md from the figures.
+"""Measures stiff and extreme cases, and writes docs/figures/stability.md from the figures.
 
-    stability.py measure --bin BUILD --device cpu --machine TEXT   writes docs/stability/cpu.json
-    stability.py measure --bin BUILD --device cuda --machine TEXT  writes docs/stability/cuda.json
-    stability.py page                                              writes docs/stability.md and its pictures
+    stability.py measure --bin BUILD --device cpu --machine TEXT   writes docs/figures/stability/cpu.json
+    stability.py measure --bin BUILD --device cuda --machine TEXT  writes docs/figures/stability/cuda.json
+    stability.py page                                              writes docs/figures/stability.md and its pictures (python3-matplotlib)
 
 BUILD has the program bench_stability (target of that name, with -DESVR_BUILD_BENCHMARKS=ON). TEXT describes the machine
 on the page. The page has the figures of both files; if one is missing, it says that they were not measured. --docs
-chooses another folder than docs.
+chooses another folder than docs/figures.
 """
 import argparse
 import json
 import pathlib
+import subprocess
 import textwrap
-
-import svg_panels
-from run_program import run
 
 DEVICES = {"cpu": "CPU", "cuda": "CUDA"}
 COLORS = {0.5: "#3b82f6", 1.0: "#16a34a", 2.0: "#ea580c"}  # by multiples of the tuned step sizes
@@ -36,12 +34,13 @@ case below is measured in three ways:
 
 - **Evaluation.** A sum of ellipsoids is evaluated in float32 and by its definition in float64 at all voxels of up to 512
   bricks. The CPU's is the function that decodes files, and CUDA's the decoder of `esvr-render`. Differences and bounds are
-  shares of the peak. The bound follows from the arithmetic ([math.md](math.md#rounding)) and adds the worst case of all
-  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the peak.
+  shares of the peak. The bound follows from the arithmetic ([math.md](../math.md#rounding)) and adds the worst case of all
+  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the
+  peak.
 - **Gradients.** The analytic derivatives of the squared error by all parameters of four ellipsoids and by kappa are
   compared with central differences in float64, in a target of 16^3 random values. Errors are shares of the sum of the
   magnitudes of the terms of the largest derivative of an ellipsoid. A case fails if an error is above its
-  [bound](math.md#rounding).
+  [bound](../math.md#rounding).
 - **Fits.** A volume is fitted in {iterations} iterations with half of the tuned step sizes, with these, and with up to 64
   times as large ones. A case fails if a fit with half, all or twice the step sizes ends early, has a number that is not
   finite, or ends with a larger error than no ellipsoid at all.
@@ -246,20 +245,44 @@ def lines(case):
         for name, color, fitted in runs:
             points = [p for p in fitted["curve"] if p[1] is not None and p[1] < EXACT]
             if points:
-                found.append(svg_panels.Line(f"{DEVICES[device]}, {name}", points, color, device != "cpu"))
+                found.append((f"{DEVICES[device]}, {name}", points, color, "--" if device != "cpu" else "-"))
     return found
+
+
+def draw(panels, path):
+    """One picture of several charts."""
+    import matplotlib  # noqa: only the page needs it
+    matplotlib.use("svg")
+    matplotlib.rcParams["svg.hashsalt"] = "stability"  # the same names in each run
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots((len(panels) + 2) // 3, min(3, len(panels)), figsize=(11, 6), squeeze=False)
+    for chart in axes.flat[len(panels):]:
+        chart.set_axis_off()
+    for chart, (title, drawn) in zip(axes.flat, panels):
+        for name, points, color, style in drawn:
+            points = [p for p in points if p[0] > 0]
+            chart.plot(*zip(*points), style, color=color, marker="o" if len(points) == 1 else None, label=name)
+        chart.set_xscale("log")
+        chart.set_title(title, fontsize=9)
+        chart.grid(alpha=0.3)
+        chart.tick_params(labelsize=7)
+    named = {l: h for chart in axes.flat for h, l in zip(*chart.get_legend_handles_labels())}
+    figure.legend(named.values(), named.keys(), loc="lower center", ncols=4, fontsize=7)
+    figure.supylabel("PSNR over the box, dB", fontsize=8)
+    figure.tight_layout(rect=(0, 0.09, 1, 1))
+    figure.savefig(path, metadata={"Date": None})
+    pyplot.close(figure)
 
 
 def curves(cases, folder):
     """Draws the curves. Returns the section of the page."""
     text = (section("Error against run time", "Each curve is a fit; its points are measured during the fit, and the time that "
             "measuring takes counts.").rstrip("\n") + "\n")
-    panels = [svg_panels.Panel(c.name, lines(c)) for c in cases if lines(c)]
-    folder.mkdir(exist_ok=True)
+    panels = [(c.name, lines(c)) for c in cases if lines(c)]
     for n in range(0, len(panels), PANELS):
         part, file = panels[n:n + PANELS], f"stability_{n // PANELS + 1}.svg"
-        (folder / file).write_text(svg_panels.draw(part, "seconds", "PSNR over the box, dB"))
-        text += f"\n![Error against run time: {', '.join(p.title for p in part)}](img/{file})\n"
+        draw(part, folder / file)
+        text += f"\n![Error against run time: {', '.join(title for title, _ in part)}](../img/{file})\n"
     exact = [c.name for c in cases if c.any().fit and not lines(c)]  # no point has an error
     if exact:
         text += f"\nThere is no curve of {', '.join(exact)}, which is exact from the first point on.\n"
@@ -270,7 +293,7 @@ def machines(files):
     text = "".join(f"- {content['device']}: {content['machine']}\n" for content in files.values())
     missing = [device for device in DEVICES if device not in files]
     for device in missing:
-        text += (f"- **{DEVICES[device]} was not measured**: `docs/stability/{device}.json` does not exist. Its columns are "
+        text += (f"- **{DEVICES[device]} was not measured**: `docs/figures/stability/{device}.json` does not exist. Its columns are "
                  f"marked \"{NOT_MEASURED}\".\n")
     return text + "\n"
 
@@ -298,7 +321,7 @@ def page(arguments):
     cases.sort(key=lambda case: not case.failures())
     introduction = INTRODUCTION.format(allowed=ALLOWED, iterations=first["iterations"])
     sections = [results(cases), evaluation(cases), gradients(cases), fits(cases), steps(cases),
-                curves(cases, arguments.docs / "img")]
+                curves(cases, arguments.docs.parent / "img")]
     (arguments.docs / "stability.md").write_text(introduction + machines(files) + verdict(cases)
                                                  + "\n".join(sections))
 
@@ -306,8 +329,8 @@ def page(arguments):
 def measure(arguments):
     folder = arguments.docs / "stability"
     folder.mkdir(parents=True, exist_ok=True)
-    run([arguments.bin / "tests/bench/stability/bench_stability", folder / f"{arguments.device}.json", "--device",
-         arguments.device, "--machine", arguments.machine])
+    subprocess.run([arguments.bin / "tests/bench/stability/bench_stability", folder / f"{arguments.device}.json", "--device",
+                    arguments.device, "--machine", arguments.machine], check=True)
 
 
 def main():
@@ -316,7 +339,7 @@ def main():
     jobs = {"measure": measure, "page": page}
     parser.add_argument("what", choices=jobs)
     parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
-    parser.add_argument("--docs", type=pathlib.Path, default=pathlib.Path("docs"))
+    parser.add_argument("--docs", type=pathlib.Path, default=pathlib.Path("docs/figures"))
     parser.add_argument("--device", choices=DEVICES, default="cpu")
     parser.add_argument("--machine", default="a machine that was not described")
     arguments = parser.parse_args()

@@ -1,7 +1,7 @@
-// Plan: the commands of README.md run in their order and in one folder, so that later ones find the
+// Plan: the commands of a document run in their order and in one folder, so that later ones find the
 // files of earlier ones. Small volumes, small pictures and few iterations make them quick. Commands
 // of other programs (./setup, cmake) are not run. Commands on smoke1.vdb are not run if
-// ESVR_DATA_DIR does not have it. The C++ program of README.md writes a file of the size that it
+// ESVR_DATA_DIR does not have it. The C++ program of docs/library.md writes a file of the size that it
 // names.
 
 #include <gmock/gmock.h>
@@ -142,15 +142,16 @@ TEST_P(DocumentedCommands, run) {
   EXPECT_GE(ran, 3u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands, testing::Values("README.md"),
-                         [](const auto&) { return std::string("readme"); });
+INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands,
+                         testing::Values("README.md", "docs/convert.md", "docs/pictures.md"),
+                         [](const auto& name) { return fs::path(name.param).stem().string(); });
 
 using DocumentedProgram = InAFolder;
 
 TEST_F(DocumentedProgram, SlowWritesAFileOfItsSize) {
   ASSERT_EQ(test::runProgram(ESVR_SAMPLE, {"plume", "smoke.vdb", "--resolution", "64"}).exitCode,
             0);
-  const auto run = test::runProgram(README_PROGRAM, {});
+  const auto run = test::runProgram(DOCUMENTED_PROGRAM, {});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_LE(fs::file_size("smoke.esvr"), 20'000u + 500u);  // the size is that of the grid
   EXPECT_EQ(test::runProgram(ESVR2VDB, {"smoke.esvr", "back.vdb"}).exitCode, 0);

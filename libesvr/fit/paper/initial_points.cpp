@@ -11,7 +11,7 @@ namespace {
 
 /// Distances between evenly spread spheres that a sphere reaches. A Gaussian that ends at 3 sigma
 /// reaches as far if its sigma is the distance, as in 3D Gaussian Splatting. An ellipsoid of the same
-/// scale would reach 1.42 distances, and pruning then loses 9 dB of Aneurysm (docs/benchmarks.md, "The
+/// scale would reach 1.42 distances, and pruning then loses 9 dB of Aneurysm (docs/figures/benchmarks.md, "The
 /// paper's method").
 constexpr double kReach = 3.0;
 

@@ -1,4 +1,4 @@
-// Makes the pictures of docs/view.md: `node test/doc_pictures.mjs smoke1.esvr smoke1.vdb` with ESVR_VIEW
+// Makes the pictures of docs/pictures.md: `node test/doc_pictures.mjs smoke1.esvr smoke1.vdb` with ESVR_VIEW
 // in the environment, where smoke1.esvr is `vdb2esvr smoke1.vdb smoke1.esvr --ratio 50`.
 import { chromium } from "playwright-core";
 import { fileURLToPath } from "node:url";
