@@ -93,6 +93,8 @@ class Flat:
         begin, size = at * self.dtype.itemsize + self.skip, count * self.dtype.itemsize
         if self.spool:
             data = self.spool.read(begin, size)
+            if begin + size == self.skip + self.needed:
+                self.spool.read(begin + size, 1)  # the end of the stream, where its checksum is
         else:
             self.file.seek(self.offset + begin)
             data = self.file.read(size)

@@ -295,7 +295,7 @@ def values_equal(numbers, value):
         if not limits.min <= int(value) <= limits.max:
             return None
         return numbers == numbers.dtype.type(int(value))
-    if numbers.dtype.kind == "f":
+    if numbers.dtype.kind == "f" and abs(value) <= np.finfo(numbers.dtype).max:
         return numbers == numbers.dtype.type(value)
     return None
 

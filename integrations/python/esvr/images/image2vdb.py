@@ -375,7 +375,7 @@ def converted(values, kind, part, tally, first, gone, options):
     if kind == "bool":
         return (values != 0 if options.threshold is None else values >= options.threshold), gone
     if kind in ("int32", "int64"):
-        if values.dtype == np.uint64 and values.size and values.max() > 2 ** 63 - 1:
+        if values.dtype == np.uint64 and values.size and int(values.max()) > 2 ** 63 - 1:
             raise esvr.BadInput(f"{part.image.path}: the value {values.max()} is beyond 2^63 - 1, the largest that an Int64 grid holds")
         return values.astype(kind), gone
     kept = None if gone is None else gone if values.ndim == 3 else gone[..., np.newaxis]
@@ -441,8 +441,6 @@ def work(arguments):
     log = program.Log(PROGRAM.name, arguments)
 
     def make():
-        import warnings
-        warnings.simplefilter("ignore")  # readers say in words of their own what the program says
         image = open_image(inputs, arguments)
         for text in image.warnings:
             log.warning(f"{image.path}: {text}")

@@ -7,6 +7,7 @@ programs of ESVR: 0 done, 1 failure, 2 usage, 3 bad input, 5 out of memory.
 import argparse
 import contextlib
 import fcntl
+import logging
 import os
 import re
 import resource
@@ -14,6 +15,7 @@ import signal
 import sys
 import textwrap
 import traceback
+import warnings
 from dataclasses import dataclass, field
 
 import esvr
@@ -245,6 +247,8 @@ def run_in_child(program, inputs, outputs, work, verbose):
     if child == 0:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash is reported, and leaves no file
         signal.signal(signal.SIGINT, interrupt_once)
+        logging.disable(logging.CRITICAL)  # readers say in words of their own what the program says
+        warnings.simplefilter("ignore")
         code = run_here(program, work, verbose)
         sys.stdout.flush()
         sys.stderr.flush()
@@ -257,10 +261,11 @@ def run_in_child(program, inputs, outputs, work, verbose):
             os.kill(child, signal.SIGINT if number == signal.SIGINT else signal.SIGKILL)
         signal.alarm(PATIENCE_S)
 
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
-        signal.signal(number, stop)
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)}
     _, status = os.waitpid(child, 0)
     signal.alarm(0)
+    for number, handler in before.items():
+        signal.signal(number, handler)
     code = os.waitstatus_to_exitcode(status)
     if code >= 0 and not stopped:
         return code

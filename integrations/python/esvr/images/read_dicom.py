@@ -80,6 +80,7 @@ def read_dicom(paths, options, folder=None):
     for path in paths:
         with reading(path, "DICOM"):
             header = pydicom.dcmread(path, stop_before_pixels=True, force=not is_preamble(path))
+            list(header)  # the elements are decoded when they are asked for
         if "Rows" not in header:  # a directory, a report
             continue
         if str(header.get("Modality")) == "SEG":
@@ -87,17 +88,18 @@ def read_dicom(paths, options, folder=None):
         series.setdefault(str(header.get("SeriesInstanceUID", "")), []).append((path, header))
     if not series:
         raise esvr.BadInput(f"{where} has no DICOM image")
-    files = chosen_series(where, series, options)
+    with reading(where, "DICOM"):
+        return image_of_series(where, chosen_series(where, series, options), options)
+
+
+def image_of_series(where, files, options):
     header = files[0][1]
     for path, other in files:
         for name in ("Rows", "Columns", "SamplesPerPixel", "BitsAllocated", "PixelRepresentation", "PhotometricInterpretation"):
             if other.get(name) != header.get(name):
                 raise esvr.BadInput(f"{path} has {name} {other.get(name)}, and {files[0][0]} has {header.get(name)}; slices of one "
                                     "image have one size and type")
-    with reading(files[0][0], "DICOM"):
-        frames = [frame for path, other in files for frame in frames_of(path, other)]
-        image = image_of(where, header, frames, options)
-    return image
+    return image_of(where, header, [frame for path, other in files for frame in frames_of(path, other)], options)
 
 
 def is_preamble(path):

@@ -472,8 +472,23 @@ def check_chunks(path, array):
             there, said = ("0.0.0", "0/0/0") if separator == "/" else ("0/0/0", "0.0.0")
             raise esvr.BadInput(f"{path}: the chunks are stored as {there}, and .zarray says that they are {said}; correct its "
                                 f"dimension_separator to '{'.' if separator == '/' else '/'}'")
+    if os.path.isdir(path) and getattr(array.compressor, "codec_id", "") == "blosc":
+        check_blosc(path, array)
     stored = array.nchunks_initialized
     if stored < array.nchunks and array.fill_value is None:
         raise esvr.BadInput(f"{path}: {array.nchunks - stored} of {array.nchunks} chunks are missing, and no fill value is named")
     missing = array.nchunks - stored
     return [f"{missing} of {array.nchunks} chunks are not stored, and have the fill value {array.fill_value}"] if missing else []
+
+
+def check_blosc(path, array):
+    """Blosc reads beyond the end of a chunk that is cut short; the length is in its header."""
+    for folder, _, names in os.walk(os.path.join(path, array.path)):
+        for name in names:
+            if name.startswith("."):
+                continue
+            with open(os.path.join(folder, name), "rb") as file:
+                head = file.read(16)
+                there = os.fstat(file.fileno()).st_size
+            if len(head) < 16 or int.from_bytes(head[12:16], "little") != there:
+                raise esvr.BadInput(f"{path}: the chunk {os.path.relpath(os.path.join(folder, name), path)} is cut short or damaged")

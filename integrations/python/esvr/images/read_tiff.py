@@ -97,8 +97,6 @@ class Slices:
 # -- one file ------------------------------------------------------------------------------------------------------
 def read_tiff(path, options):
     tifffile = need("tifffile", "python3-tifffile", path, "TIFF")
-    import logging
-    logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     with reading(path, "TIFF"):
         file = tifffile.TiffFile(path)
         page = file.pages.first
@@ -106,7 +104,7 @@ def read_tiff(path, options):
         shape, letters = series.shape, series.axes
         if page.dtype is None:
             raise esvr.BadInput(f"{path} has {page.bitspersample} bits a sample, in a form that is not read")
-        if file.is_imagej:
+        if file.is_imagej and not is_scifio(file):
             letters = imagej_axes(file, letters)
         elif set(letters) & {"Q", "I"} and "Z" not in letters:
             letters = letters.replace("Q", "Z", 1) if "Q" in letters else letters.replace("I", "Z", 1)
@@ -131,6 +129,8 @@ def read_tiff(path, options):
 
 def series_of(path, file, dataset):
     """The series of the image. Pages that were written one by one are joined; of other images, --dataset names one."""
+    if is_scifio(file):
+        return scifio_series(path, file)
     series = [s for s in file.series if s.kind not in ("thumbnail", "label", "macro")]
     first = series[0]
     if file.is_ome and first.kind != "ome":
@@ -148,8 +148,8 @@ def series_of(path, file, dataset):
         + "; name one by --dataset and its number")
 
 
-class OmeSeries:
-    """Pages in the order of OME's planes."""
+class NamedPages:
+    """Pages in the order of the planes that a description names."""
 
     def __init__(self, pages, shape, axes):
         self.pages, self.shape, self.axes = pages, shape, axes
@@ -175,7 +175,25 @@ def ome_series(path, file):
     if None in ordered:
         raise esvr.BadInput(f"{path}: the OME-XML names no page for some of its planes")
     slow_first = fast_first[::-1]
-    return OmeSeries(ordered, tuple(sizes[letter] for letter in slow_first) + file.pages.first.shape, slow_first + "YX")
+    return NamedPages(ordered, tuple(sizes[letter] for letter in slow_first) + file.pages.first.shape, slow_first + "YX")
+
+
+def is_scifio(file):
+    """Whether the file has SCIFIO's axes, which tifffile takes for ImageJ's."""
+    return {"SCIFIO", "axes", "lengths"} <= set(lines_of(file.pages.first.description or ""))
+
+
+def scifio_series(path, file):
+    said = lines_of(file.pages.first.description)
+    names = [name.strip().lower() for name in said["axes"].split(",")]
+    lengths = [int(length) for length in said["lengths"].split(",")]
+    pages, rows = list(file.pages), file.pages.first.shape
+    if names[:2] != ["x", "y"] or len(names) != len(lengths) or tuple(lengths[1::-1]) != rows[:2] or \
+            product(lengths[2:]) != len(pages):
+        raise esvr.BadInput(f"{path} has {len(pages)} pages of {rows[1]} x {rows[0]} pixels, and SCIFIO's axes {said['axes']} of the "
+                            f"lengths {said['lengths']}")
+    letters = "".join({"z": "Z", "channel": "C", "time": "T"}.get(name, "Q") for name in names[:1:-1])
+    return NamedPages(pages, tuple(lengths[:1:-1]) + rows, letters + "YXS"[:len(rows)])
 
 
 class JoinedSeries:
@@ -303,11 +321,11 @@ class Space:
 def describe(path, file, page, space, options):
     if file.is_ome:
         describe_ome(file.ome_metadata, space)
+    elif is_scifio(file):
+        describe_scifio(page.description, space)
     elif file.is_imagej:
         describe_resolution(page, space)
         describe_imagej(path, page.description, space, options)
-    elif page.description.startswith("SCIFIO="):
-        describe_scifio(page.description, space)
     elif file.is_lsm:
         space.spacing = [abs(float(file.lsm_metadata[f"VoxelSize{axis}"])) or 1.0 for axis in "XYZ"]
         space.unit = "m"
@@ -359,7 +377,7 @@ def describe_imagej(path, description, space, options):
 
 def describe_scifio(description, space):
     said = lines_of(description)
-    names = [name.strip().lower() for name in said.get("axes", "").split(",")]
+    names = [name.strip().lower() for name in said["axes"].split(",")]
     scales, units = said.get("scales", "").split(","), said.get("units", "").split(",")
     if len(scales) != len(names):
         return

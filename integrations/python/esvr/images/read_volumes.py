@@ -525,6 +525,9 @@ def meta_matrix(fields, count):
 
 
 # -- MRC -----------------------------------------------------------------------------------------------------------
+IMOD_STAMP = 1146047817  # of files of IMOD, whose flags say whether bytes are signed
+
+
 def read_mrc(path, options):
     mrcfile = need("mrcfile", "python3-mrcfile", path, "MRC")
     from mrcfile.utils import data_dtype_from_header
@@ -542,6 +545,9 @@ def read_mrc(path, options):
             raise esvr.BadInput(f"{path}: its map axes are {order}, and each of 1, 2 and 3 must be there once")
         offset = 1024 + max(int(header.nsymbt), 0)
         affine, unit = mrc_matrix(header, order)
+        imod, flags = (int.from_bytes(header.tobytes()[at:at + 4], "big" if dtype.byteorder == ">" else "little") for at in (152, 156))
+        if dtype.itemsize == 1 and imod == IMOD_STAMP and not flags & 1:
+            dtype = np.dtype("u1")
     if dtype.kind not in "iuf":
         raise esvr.BadInput(f"{path} has the mode {int(header.mode)}, complex numbers, which is not read")
     kinds = [SPACE[number - 1] for number in order]  # of columns, rows and sections

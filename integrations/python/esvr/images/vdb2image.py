@@ -17,7 +17,7 @@ ENDINGS = [ending for endings in FORMATS for ending in endings]
 
 PROGRAM = Program(
     "vdb2image", "Converts a grid to an image of voxels, with the type, lengths and orientation of the image that it came from.",
-    "  vdb2image IN OUT [options]     IN: .vdb, .nvdb or .esvr; OUT: " + " ".join(ENDINGS),
+    "  vdb2image IN OUT [options]     IN: .vdb, .nvdb or .esvr\n                                 OUT: " + " ".join(ENDINGS),
     [Option("grid", "NAME", "which of several grids", short="g"),
      Option("frame", "N", "which frame of a sequence in one .esvr file", int),
      Option("type", "TYPE", "type of the values: uint8, int16, float32, ... (as the image had it, where it holds all values)",
@@ -213,8 +213,6 @@ def work(arguments):
     format_name, write = next(found for endings, found in FORMATS.items() if out.lower().endswith(endings))
 
     def make():
-        import warnings
-        warnings.simplefilter("ignore")
         grid = esvr.PackedGrid.from_file(source, arguments.grid, frame=arguments.frame, max_memory=arguments.max_memory)
         volume = Volume(grid, out, format_name, arguments, log)
         part = program.part_of(out)
