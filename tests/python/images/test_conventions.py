@@ -220,6 +220,18 @@ def test_units_and_origins_of_imagej(tmp_path):
     assert np.allclose(made.matrix, [[0.5, 0, 0, -5], [0, 0.25, 0, 0], [0, 0, 30, 30], [0, 0, 0, 1]])
 
 
+@pytest.mark.parametrize("order", ["XYCZT", "XYZCT"])
+@pytest.mark.parametrize("prefix", ["", "ome:"])
+def test_ome_without_tiffdata(tmp_path, order, prefix):
+    xmlns = f"xmlns{':ome' if prefix else ''}=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\""
+    text = (f'<?xml version="1.0" encoding="UTF-8"?><{prefix}OME {xmlns}><{prefix}Image ID="Image:0"><{prefix}Pixels ID="Pixels:0" '
+            f'DimensionOrder="{order}" Type="uint16" SizeX="6" SizeY="5" SizeZ="4" SizeC="2" SizeT="1" PhysicalSizeX="0.5" '
+            f'PhysicalSizeZ="2"></{prefix}Pixels></{prefix}Image></{prefix}OME>')
+    data = np.stack([ramp(), ramp() + 1000], axis=1 if order == "XYCZT" else 0).reshape(8, 5, 6)
+    made = convert(tiff(tmp_path / "a.ome.tif", data, description=text), "--channel", 1, "--unit", "um")
+    assert np.array_equal(made.values, ramp() + 1000) and np.allclose(made.spacing, [0.5, 0.5, 2])
+
+
 def test_axes_of_scifio(tmp_path):
     text = "SCIFIO=0.46.0\naxes=X,Y,Z,Channel\nlengths=6,5,4,2\nscales=0.5,0.25,2.0,1.0\nunits=um,um,um,null\nbitsPerPixel=16\n"
     data = np.concatenate([ramp(), ramp() + 1000])

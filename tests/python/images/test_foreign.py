@@ -1,4 +1,7 @@
 """Files that other tools write are read as these tools, or a second one, read them."""
+import json
+import os
+import pathlib
 import shutil
 import struct
 import subprocess
@@ -6,9 +9,10 @@ import subprocess
 import numpy as np
 import pytest
 
+from esvr.images import image2vdb, vdb2image
 from esvr.images.image import LPS_TO_RAS
 
-from conversions import convert, convert_all, dicom, ramp, tilted
+from conversions import convert, convert_all, dicom, ramp, run_here, tilted
 
 def same(made, values, matrix=None, atol=1e-5):
     assert made.values.shape == values.shape
@@ -398,6 +402,73 @@ def test_dicom_by_pydicom_and_dcmtk(tmp_path, tool, kind):
     folder = dicom(tmp_path / "s", ramp(kind) - (300 if kind == "i2" else 0), tool=tool)
     made = convert(folder)
     same(made, ramp("i4") - (300 if kind == "i2" else 0), tilted(), atol=1e-4)
+
+
+# -- ITK and ImageJ ------------------------------------------------------------------------------------------------------
+def itk(*words):
+    """ITK as WebAssembly: npm install @itk-wasm/image-io@1.6.1; ESVR_ITK_WASM is then the folder node_modules."""
+    folder = os.environ.get("ESVR_ITK_WASM", "")
+    if not folder or not shutil.which("node"):
+        pytest.skip("ESVR_ITK_WASM is not set (npm install @itk-wasm/image-io)")
+    script = pathlib.Path(__file__).with_name("itk.mjs")
+    return json.loads(subprocess.run(["node", str(script), folder, *map(str, words)], check=True, capture_output=True).stdout)
+
+
+def test_itk_writes_and_reads(tmp_path):
+    files = [tmp_path / f"a.{ending}" for ending in ("mha", "nii.gz", "nrrd")]
+    itk("write", *files)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]]) * [0.5, 0.75, 2]
+    matrix[:3, 3] = 6, -100, 7
+    backs = []
+    for file in files:
+        same(convert(file), ramp(), LPS_TO_RAS @ matrix)
+        backs.append(tmp_path / f"back.{file.name.partition('.')[2]}")
+        assert run_here(image2vdb, file, tmp_path / "a.vdb", "-f") == 0 and run_here(vdb2image, tmp_path / "a.vdb", backs[-1]) == 0
+    for seen in itk("read", *backs):
+        assert seen["type"] == "int16" and seen["size"] == [6, 5, 4] and np.array_equal(seen["data"], ramp().ravel())
+        assert np.allclose(np.array(seen["direction"]).reshape(3, 3) * seen["spacing"], matrix[:3, :3], atol=1e-5)
+        assert np.allclose(seen["origin"], matrix[:3, 3], atol=1e-4)
+
+
+def imagej(tmp_path, macro, screen=()):
+    jar = pathlib.Path("/usr/share/java/ij.jar")
+    if not jar.exists() or not shutil.which("java"):
+        pytest.skip("ImageJ is missing (Debian: imagej)")
+    (tmp_path / "m.ijm").write_text(macro)
+    headless = [] if screen else ["-Djava.awt.headless=true"]
+    subprocess.run([*screen, "java", *headless, "-cp", str(jar), "ij.ImageJ", "-batch", str(tmp_path / "m.ijm")],
+                   capture_output=True, check=True, timeout=60)
+
+
+def test_imagej_writes_and_reads(tmp_path):
+    pytest.importorskip("tifffile")
+    # Voxel (x, y) of slice n (from 1 on) of the hyperstack of 2 channels and 4 slices.
+    imagej(tmp_path, f"""
+newImage("a", "16-bit black", 6, 5, 8);
+for (n = 1; n <= 8; n++) {{ setSlice(n); for (y = 0; y < 5; y++) for (x = 0; x < 6; x++) setPixel(x, y, 1000 * n + 10 * y + x); }}
+setVoxelSize(0.5, 0.25, 2, "micron");
+Stack.setDimensions(2, 4, 1);
+saveAs("Tiff", "{tmp_path}/hyper.tif");
+newImage("b", "32-bit ramp", 6, 5, 4);
+saveAs("Tiff", "{tmp_path}/float.tif");
+""")
+    made = convert(tmp_path / "hyper.tif", "--channel", 1, "--unit", "um")
+    z, y, x = np.mgrid[0:4, 0:5, 0:6]
+    assert np.array_equal(made.values, 1000 * (2 * z + 2) + 10 * y + x) and np.allclose(made.spacing, [0.5, 0.25, 2])
+    assert np.allclose(convert(tmp_path / "float.tif").values, x / 6, atol=1e-6)
+    assert run_here(image2vdb, tmp_path / "hyper.tif", tmp_path / "a.vdb", "--channel", 1) == 0
+    assert run_here(vdb2image, tmp_path / "a.vdb", tmp_path / "back.tif") == 0
+    if not shutil.which("xvfb-run"):
+        pytest.skip("ImageJ opens files on a screen only (Debian: xvfb)")
+    imagej(tmp_path, f"""
+open("{tmp_path}/back.tif");
+getVoxelSize(w, h, d, unit); getDimensions(x, y, c, z, t); setSlice(3);
+File.saveString("" + w + " " + h + " " + d + " " + unit + " " + x + " " + y + " " + c + " " + z + " " + t + " " + getPixel(4, 2),
+                "{tmp_path}/said.txt");
+""", ["xvfb-run", "-a"])
+    said = (tmp_path / "said.txt").read_text().split()
+    assert np.allclose([float(n) for n in said[:3]], [0.5, 0.25, 2]) and said[3:] == ["microns", "6", "5", "1", "4", "1", "6024"]
 
 
 # -- raw numbers ---------------------------------------------------------------------------------------------------------------

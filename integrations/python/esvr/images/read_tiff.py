@@ -156,26 +156,15 @@ class NamedPages:
 
 
 def ome_series(path, file):
-    """The planes of OME-XML whose elements have a namespace prefix, which tifffile takes for a plain stack."""
+    """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the dimensions."""
     pixels = next(e for e in tree.fromstring(file.ome_metadata).iter() if local_name(e) == "Pixels")
-    fast_first = pixels.get("DimensionOrder", "XYCZT")[2:]
+    slow_first = pixels.get("DimensionOrder", "XYCZT")[:1:-1]
     sizes = {letter: int(pixels.get(f"Size{letter}", 1)) for letter in "CZT"}
     pages = list(file.pages)
-    if product(sizes.values()) != len(pages):
-        raise esvr.BadInput(f"{path} has {len(pages)} pages, and its OME-XML names {sizes['C']} channels of {sizes['Z']} slices at "
-                            f"{sizes['T']} times")
-    ordered = [None] * len(pages)
-    step = {fast_first[0]: 1, fast_first[1]: sizes[fast_first[0]], fast_first[2]: sizes[fast_first[0]] * sizes[fast_first[1]]}
-    for data in (e for e in pixels if local_name(e) == "TiffData" and e.get("IFD") is not None):
-        first = sum(int(data.get(f"First{letter}", 0)) * step[letter] for letter in "CZT")
-        for k in range(int(data.get("PlaneCount", 1))):
-            ordered[first + k] = pages[int(data.get("IFD")) + k]
-    if not any(ordered):
-        ordered = pages
-    if None in ordered:
-        raise esvr.BadInput(f"{path}: the OME-XML names no page for some of its planes")
-    slow_first = fast_first[::-1]
-    return NamedPages(ordered, tuple(sizes[letter] for letter in slow_first) + file.pages.first.shape, slow_first + "YX")
+    if product(sizes.values()) != len(pages) or any(local_name(e) == "TiffData" for e in pixels):
+        raise esvr.BadInput(f"{path} has {len(pages)} pages, which do not fit its OME-XML of {sizes['C']} channels of {sizes['Z']} "
+                            f"slices at {sizes['T']} times")
+    return NamedPages(pages, tuple(sizes[letter] for letter in slow_first) + file.pages.first.shape, slow_first + "YX")
 
 
 def is_scifio(file):
