@@ -208,9 +208,7 @@ def test_big_endian_floats_with_a_predictor_are_refused(tmp_path):
     data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_Float32, options)
     data.GetRasterBand(1).WriteArray(ramp("f4")[0])
     data = None
-    arguments = [tmp_path / "a.tif"]
-    with pytest.raises(esvr.BadInput, match="big-endian order with predictor 3"):
-        convert(*arguments)
+    refused(esvr.BadInput, "big-endian order with predictor 3", tmp_path / "a.tif")
 
 
 def test_units_and_origins_of_imagej(tmp_path):
@@ -595,7 +593,8 @@ def test_gaps_are_named(tmp_path):
 def test_series_are_named(tmp_path):
     def change(k, data):
         data.SeriesNumber, data.SeriesDescription = 7, "bone"
-    dicom(tmp_path / "s/1", ramp()) if (tmp_path / "s").mkdir() is None else None
+    (tmp_path / "s").mkdir()
+    dicom(tmp_path / "s/1", ramp())
     dicom(tmp_path / "s/2", ramp() + 1000, change=change)
     refused(esvr.UsageError, r"2 series: 3 \(no description, 4 files\); 7 \(bone, 4 files\)", tmp_path / "s")
     assert np.array_equal(convert(tmp_path / "s", "--dataset", 7).values, ramp() + 1000)
@@ -617,7 +616,7 @@ def test_times_of_dicom(tmp_path):
         data.InstanceNumber, data.TemporalPositionIdentifier = k + 101, 2
     folder = dicom(tmp_path / "s", ramp())
     first = next(folder.iterdir())
-    uid = __import__("pydicom").dcmread(first).SeriesInstanceUID
+    uid = pytest.importorskip("pydicom").dcmread(first).SeriesInstanceUID
 
     def second(k, data):
         change(k, data)
@@ -656,6 +655,42 @@ def test_frames_of_one_file(tmp_path):
     made = convert(dicom(tmp_path / "s", ramp()[:1], change=change) / "s0.dcm")
     assert np.array_equal(made.values, ramp() * 2 + 1)
     assert np.allclose(made.matrix, [[-0.5, 0, 0, -1], [0, -0.75, 0, -2], [0, 0, 2.5, 22.5], [0, 0, 0, 1]])
+
+
+def test_files_without_a_preamble(tmp_path):
+    pydicom = pytest.importorskip("pydicom")
+    folder = dicom(tmp_path / "s", ramp())
+    for path in folder.iterdir():
+        data = pydicom.dcmread(path)
+        data.is_implicit_VR, data.preamble = True, None
+        del data.file_meta
+        pydicom.dcmwrite(path, data)
+    made = convert(folder)
+    assert np.array_equal(made.values, ramp()) and np.allclose(made.matrix, tilted(), atol=1e-4)
+
+
+def test_films_and_doses(tmp_path):
+    def film(k, data):
+        data.NumberOfFrames, data.PixelData = 4, ramp().tobytes()
+        del data.ImagePositionPatient, data.ImageOrientationPatient, data.PixelSpacing
+    path = dicom(tmp_path / "film", ramp()[:1], change=film) / "s0.dcm"
+    refused(esvr.UsageError, "time: 4", path)
+    assert np.array_equal(convert(path, "--time", 2).values[0], ramp()[2])
+
+    def dose(k, data):
+        data.NumberOfFrames, data.PixelData, data.Modality = 4, ramp().tobytes(), "RTDOSE"
+        data.GridFrameOffsetVector, data.DoseGridScaling = [0, 2.5, 5, 7.5], "0.5"
+        data.ImagePositionPatient, data.ImageOrientationPatient = [1, 2, 3], [1, 0, 0, 0, 1, 0]
+    made = convert(dicom(tmp_path / "dose", ramp()[:1], change=dose) / "s0.dcm")
+    assert np.array_equal(made.values, ramp() * 0.5)
+    assert np.allclose(made.matrix, [[-0.5, 0, 0, -1], [0, -0.75, 0, -2], [0, 0, 2.5, 3], [0, 0, 0, 1]])
+
+
+def test_slices_without_positions(tmp_path):
+    def change(k, data):
+        del data.ImagePositionPatient
+    made = convert(dicom(tmp_path / "s", ramp(), change=change, names=["z.dcm", "a.dcm", "b.dcm", "c.dcm"]))
+    assert np.array_equal(made.values, ramp()) and any("instance numbers" in text for text in made.warnings)
 
 
 # -- integers and masks ------------------------------------------------------------------------------------------------------

@@ -190,6 +190,8 @@ class Image:
 
     def __post_init__(self):
         self.dtype = np.dtype(self.dtype)
+        if self.scale is not None and tuple(self.scale) == (1.0, 0.0):
+            self.scale = None
         if self.dtype.kind not in "iufb":
             raise esvr.BadInput(f"{self.path} holds values of type {self.dtype.name}, which is not read; real numbers are")
         require_shape(self.path, [axis.size for axis in self.axes])
@@ -276,7 +278,7 @@ def is_integral(scale):
 
 def apply_scale(numbers, scale):
     """Calibrated values: integers of 64 bits where slope and intercept of integers are whole, else float64."""
-    if scale is None or tuple(scale) == (1.0, 0.0):
+    if scale is None:
         return numbers
     slope, intercept = scale
     if numbers.dtype.kind in "iu" and numbers.dtype.itemsize <= 4 and is_integral(scale):

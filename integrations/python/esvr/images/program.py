@@ -131,6 +131,10 @@ class Program:
 
 
 class Parser(argparse.ArgumentParser):
+    def __init__(self, **options):
+        super().__init__(**options)
+        self._negative_number_matcher = re.compile(r"-(\d|\.\d)")  # also -1e3 is a number and no option
+
     def error(self, message):
         raise esvr.UsageError(message)
 
@@ -160,7 +164,7 @@ def readers_text():
     """The versions of the libraries that read and write, for --version; those that are missing are left out."""
     import importlib.metadata
     lines = []
-    for name in ("numpy", "tifffile", "nibabel", "mrcfile", "pydicom", "h5py", "xarray", "netCDF4", "zarr", "GDAL"):
+    for name in ("numpy", "tifffile", "nibabel", "mrcfile", "pydicom", "h5py", "netCDF4", "zarr", "GDAL"):
         try:
             lines.append(f"{name} {importlib.metadata.version(name)}")
         except importlib.metadata.PackageNotFoundError:

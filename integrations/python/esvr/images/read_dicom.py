@@ -15,7 +15,9 @@ TIMES = ("TemporalPositionIdentifier", "TemporalPositionIndex", "TriggerTime", "
 def is_dicom(path):
     with open(path, "rb") as file:
         head = file.read(132)
-    return head[128:] == b"DICM" or head[:6] in (b"\x08\0\x05\0\x0a\0", b"\x08\0\0\0\x04\0")  # the latter without a preamble
+    # Files of old programs have no preamble and begin with one of the first elements of the group 8.
+    begins = head[:2] == b"\x08\0" and head[3:4] == b"\0" and head[2:3] in b"\0\1\5\x08\x12\x14\x16\x18"
+    return head[128:] == b"DICM" or begins and (head[4:6] in (b"CS", b"UI", b"UL") or 0 < int.from_bytes(head[4:8], "little") <= 64)
 
 
 class Frame:

@@ -122,7 +122,7 @@ def read_nifti(path, options):
     fetch = Flat(data_path, dtype, [axis.size for axis in axes], *((0, "deflate", offset) if is_gzip(data_path) else (offset,)))
     image = Image("NIfTI" if kind is not AnalyzeHeader else "Analyze", path, axes, dtype, fetch, matrix, unit,
                   notes=[form])
-    image.scale = None if scale[0] is None else (float(scale[0]), float(scale[1]))
+    image.scale = None if scale[0] is None or tuple(scale) == (1, 0) else (float(scale[0]), float(scale[1]))
     image.metadata["image_space"] = "right-anterior-superior"
     return image
 
