@@ -710,6 +710,19 @@ def test_integers_that_no_grid_holds_are_refused(tmp_path):
     refused(esvr.BadInput, "beyond 2\\^24", tmp_path / "b.npy", "--as", "float")
 
 
+def test_doubles_hold_larger_integers_and_fill_values_do_not_count(tmp_path):
+    np.save(tmp_path / "a.npy", ramp("i8") + 2 ** 40)
+    made = convert(tmp_path / "a.npy", "--as", "double")
+    assert made.grid.value_type == "double" and np.array_equal(made.values, ramp("i8") + 2 ** 40)
+    netcdf = pytest.importorskip("netCDF4")
+    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
+        for dim, size in zip("zyx", (4, 5, 6)):
+            file.createDimension(dim, size)
+        file.createVariable("ids", "u8", ("z", "y", "x"), fill_value=2 ** 64 - 1)[:] = np.ma.MaskedArray(ramp("u8"), ramp() == 1)
+    made = convert(tmp_path / "a.nc")
+    assert made.grid.value_type == "int64" and made.missing == 1 and made.values[0, 0, 1] == 2
+
+
 def test_masks_and_empty_masks(tmp_path):
     np.save(tmp_path / "a.npy", ramp() > 200)
     assert convert(tmp_path / "a.npy").grid.value_type == "bool"

@@ -64,7 +64,8 @@ class Axis:
         return f"{shown}: {self.size}{labels}"
 
 
-NAMES = {"x": "x", "y": "y", "z": "z", "c": CHANNEL, "s": "sample", "t": TIME, "v": VECTOR, "component": VECTOR, "depth": "z", "height": "y", "width": "x", "row": "y", "col": "x", "column": "x", "plane": "z",
+NAMES = {"x": "x", "y": "y", "z": "z", "c": CHANNEL, "s": "sample", "t": TIME, "v": VECTOR, "component": VECTOR,
+         "depth": "z", "height": "y", "width": "x", "row": "y", "col": "x", "column": "x", "plane": "z",
          "channel": CHANNEL, "channels": CHANNEL, "time": TIME, "frame": TIME, "level": "z", "lev": "z", "altitude": "z",
          "lat": "y", "latitude": "y", "lon": "x", "longitude": "x"}
 

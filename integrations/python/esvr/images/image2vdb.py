@@ -11,7 +11,7 @@ from . import program, read_dicom, read_science, read_tiff, read_volumes
 from .image import BRICK, TIME, VECTOR, affine_of, factor, natural, reading, unit_named
 from .program import Option, Program, byte_size, number
 
-EXACT = 2 ** 24  # up to here, floats hold every whole number
+EXACT = {"float": 2 ** 24, "vec3s": 2 ** 24, "double": 2 ** 53}  # up to here, grids of these types hold every whole number
 SMALLEST_VOLUME = 1e-14  # of a voxel; OpenVDB takes a matrix with a determinant of 3e-15 for singular
 UNITS = ["mm", "um", "nm", "angstrom"]
 SLAB_BYTES = 64 << 20
@@ -326,9 +326,9 @@ def convert(name, part, options, log):
         except Missing:
             has_missing = True
         except Beyond as beyond:
-            if getattr(options, "as") != "auto" or normal:
-                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^24, up to which a float holds whole numbers; "
-                                    "--as integer keeps it") from beyond
+            if getattr(options, "as") != "auto" or normal or part.is_vector:
+                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind].bit_length() - 1}, up to which "
+                                    f"a grid of type {kind} holds whole numbers; --as integer keeps it") from beyond
             kind = "int32" if part.image.dtype == np.int32 and part.image.scale is None else "int64"
 
 
@@ -340,10 +340,10 @@ def pack(name, part, options, log, kind, normal, has_missing):
         metadata["length_unit"] = unit
     if image.unit:
         metadata["image_unit"] = image.unit
-    if has_missing:
-        metadata["image_missing"] = True  # inactive voxels are missing
     scale = 1.0 / normal if normal else 1.0
     threshold = options.threshold
+    if has_missing and threshold is None and kind != "bool":
+        metadata["image_missing"] = True  # all inactive voxels are missing
     by_builder = kind in ("float", "double", "int32", "int64")
     builder = esvr.GridBuilder(kind, name=name, background=options.background * scale if by_builder else 0,
                                threshold=threshold * scale if threshold is not None and by_builder else None,
@@ -372,39 +372,45 @@ def pack(name, part, options, log, kind, normal, has_missing):
 
 def converted(values, kind, part, tally, first, gone, options):
     """The values in a type that the builder takes, and which are missing (None if none is)."""
+    if values.dtype.kind == "f":
+        values, gone = finite(values, kind, part, tally, first, gone, options)
     if kind == "bool":
         return (values != 0 if options.threshold is None else values >= options.threshold), gone
     if kind in ("int32", "int64"):
-        if values.dtype == np.uint64 and values.size and int(values.max()) > 2 ** 63 - 1:
-            raise esvr.BadInput(f"{part.image.path}: the value {values.max()} is beyond 2^63 - 1, the largest that an Int64 grid holds")
+        inside = values if gone is None else values[~gone]
+        if values.dtype == np.uint64 and inside.size and int(inside.max()) > 2 ** 63 - 1:
+            raise esvr.BadInput(f"{part.image.path}: the value {inside.max()} is beyond 2^63 - 1, the largest that an Int64 grid holds")
         return values.astype(kind), gone
-    kept = None if gone is None else gone if values.ndim == 3 else gone[..., np.newaxis]
     if values.dtype.kind in "iu" and values.dtype.itemsize > 2:
         inside = values if gone is None else values[~gone]
         most = max((int(inside.min()), int(inside.max())), key=abs) if inside.size else 0
-        if abs(most) > EXACT:
+        if abs(most) > EXACT[kind]:
             raise Beyond(most)
-    if values.dtype.kind in "iub" and (values.dtype.itemsize > 2 or kind == "vec3s" or values.dtype.kind == "b"):
-        values = values.astype(np.float32)
-    elif values.dtype.kind == "f":
-        exact, values = values, values.astype(np.float64 if kind == "double" else np.float32, copy=False)
-        if part.image.scale is None and values.dtype.itemsize < exact.dtype.itemsize:
-            tally.is_rounded = tally.is_rounded or bool(np.any((values != exact) & np.isfinite(exact)))
-        bad = ~np.isfinite(values)
-        if kept is not None:
-            bad &= ~kept
-        if bad.any():
-            if options.nonfinite == "missing":
-                bad = bad.any(axis=3) if bad.ndim == 4 else bad
-                gone = bad if gone is None else gone | bad
-            else:
-                refuse_nonfinite(part, tally, first, bad, options)
-        if gone is not None or bad.any():
-            values = np.where(np.isfinite(values), values, values.dtype.type(0))
+    if kind == "vec3s" or values.dtype.kind == "b" or values.dtype.itemsize > 2:
+        values = values.astype(np.float64 if kind == "double" else np.float32, copy=False)
     if kind == "vec3s" and part.image.turn is not None and not options.stored:
         values = np.einsum("rc,xyzc->xyzr", part.image.turn, values.astype(np.float64)).astype(np.float32)
     if not values.flags.aligned or not values.dtype.isnative:
         values = values.astype(values.dtype.newbyteorder("="))
+    return values, gone
+
+
+def finite(values, kind, part, tally, first, gone, options):
+    """Floats of the type of the grid, without NaN and infinity, and which are missing."""
+    exact, values = values, values.astype(np.float64 if kind == "double" else np.float32, copy=False)
+    if part.image.scale is None and values.dtype.itemsize < exact.dtype.itemsize:
+        tally.is_rounded = tally.is_rounded or bool(np.any((values != exact) & np.isfinite(exact)))
+    bad = ~np.isfinite(values)
+    if gone is not None:
+        bad &= ~(gone if values.ndim == 3 else gone[..., np.newaxis])
+    if bad.any():
+        if options.nonfinite == "missing":
+            bad = bad.any(axis=3) if bad.ndim == 4 else bad
+            gone = bad if gone is None else gone | bad
+        else:
+            refuse_nonfinite(part, tally, first, bad, options)
+    if gone is not None or bad.any():
+        values = np.where(np.isfinite(values), values, values.dtype.type(0))
     return values, gone
 
 
