@@ -64,6 +64,19 @@ VectorGrid readVector(const std::filesystem::path& path, const std::string& name
   return readVector(path, placeIn(path, name), options);
 }
 
+PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
+                      const ReadOptions& options) {
+  return vdb::library().readPacked(path, place, options);
+}
+
+PackedGrid readPacked(const std::filesystem::path& path, const std::string& name,
+                      const ReadOptions& options) {
+  const NamedGrid grid = namedIn(path, name);
+  if (!grid.component) return readPacked(path, grid.place, options);
+  const VolumeGrid volume = readComponent(path, grid.place, *grid.component, options);
+  return packed(volume.descriptor, volume.volume);
+}
+
 std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                      std::span<const std::size_t> places,
                                      const ReadOptions& options) {
@@ -78,6 +91,10 @@ VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {
 
 VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options) {
   return vdb::library().readVector(grid, options);
+}
+
+PackedGrid readPacked(const CarriedGrid& grid, const ReadOptions& options) {
+  return vdb::library().readPacked(grid, options);
 }
 
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,

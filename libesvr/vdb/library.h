@@ -41,6 +41,8 @@ class Library {
                                                  const ReadOptions& options) const = 0;
   [[nodiscard]] virtual VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
                                               const ReadOptions& options) const = 0;
+  [[nodiscard]] virtual PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
+                                              const ReadOptions& options) const = 0;
   [[nodiscard]] virtual std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                                              std::span<const std::size_t> places,
                                                              const ReadOptions& options) const = 0;
@@ -48,6 +50,8 @@ class Library {
   [[nodiscard]] virtual VolumeGrid readGrid(const CarriedGrid& grid,
                                             const ReadOptions& options) const = 0;
   [[nodiscard]] virtual VectorGrid readVector(const CarriedGrid& grid,
+                                              const ReadOptions& options) const = 0;
+  [[nodiscard]] virtual PackedGrid readPacked(const CarriedGrid& grid,
                                               const ReadOptions& options) const = 0;
   virtual void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                           std::span<const GridToWrite> grids,

@@ -17,6 +17,8 @@ class OpenVdb final : public Library {
                                          const ReadOptions& options) const override;
   [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
                                       const ReadOptions& options) const override;
+  [[nodiscard]] PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
+                                      const ReadOptions& options) const override;
   [[nodiscard]] std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                                      std::span<const std::size_t> places,
                                                      const ReadOptions& options) const override;
@@ -24,6 +26,8 @@ class OpenVdb final : public Library {
   [[nodiscard]] VolumeGrid readGrid(const CarriedGrid& grid,
                                     const ReadOptions& options) const override;
   [[nodiscard]] VectorGrid readVector(const CarriedGrid& grid,
+                                      const ReadOptions& options) const override;
+  [[nodiscard]] PackedGrid readPacked(const CarriedGrid& grid,
                                       const ReadOptions& options) const override;
   void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                   std::span<const GridToWrite> grids, const WriteOptions& options) const override;

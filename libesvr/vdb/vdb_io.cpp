@@ -88,6 +88,17 @@ VectorGrid OpenVdb::readVector(const std::filesystem::path& path, std::size_t pl
                      [&](InputFile& file) { return readOpenVdbVector(file, place, options); });
 }
 
+PackedGrid OpenVdb::readPacked(const std::filesystem::path& path, std::size_t place,
+                               const ReadOptions& options) const {
+  return readingFrom(path, [&](InputFile& file) {
+    if (formatOf(file) == FileFormat::kOpenVdb) return readOpenVdbPacked(file, place, options);
+    ReadOptions anyNumber = options;
+    anyNumber.allowEmpty = true;
+    const VolumeGrid grid = readNanoVdbGrid(file, place, anyNumber);
+    return packed(grid.descriptor, grid.volume);
+  });
+}
+
 std::vector<CarriedGrid> OpenVdb::readCarried(const std::filesystem::path& path,
                                               std::span<const std::size_t> places,
                                               const ReadOptions& options) const {

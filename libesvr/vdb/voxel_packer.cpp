@@ -9,7 +9,7 @@
 #include "vdb/errors.h"
 #include "vdb/make_nano.h"
 #include "vdb/open_vdb.h"
-#include "vdb/scalar_trees.h"
+#include "vdb/trees.h"
 #include "vdb/stream_archive.h"
 #include "vdb/volume_to_tree.h"
 
