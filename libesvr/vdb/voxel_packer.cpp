@@ -9,8 +9,8 @@
 #include "vdb/errors.h"
 #include "vdb/make_nano.h"
 #include "vdb/open_vdb.h"
-#include "vdb/trees.h"
 #include "vdb/stream_archive.h"
+#include "vdb/trees.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {

@@ -43,7 +43,7 @@ class Tools:
 
     def program(self, name):
         folders = {"vdb2esvr": "vdb2esvr", "esvr2vdb": "esvr2vdb", "esvr-render": "render", "esvr-compare": "compare",
-                   "esvr-sample": "samples", "image2vdb": "samples", "bench_economy": "tests/bench/economy"}
+                   "esvr-sample": "samples", "image2vdb": "python", "bench_economy": "tests/bench/economy"}
         return self.bin / folders[name] / name
 
     def sample(self, kind, resolution):

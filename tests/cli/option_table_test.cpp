@@ -254,22 +254,6 @@ Table stabilityTests() {
       {"--scratch", "CompareStability.refusesWhatHasNoEllipsoidsAndWhatIsTooLarge"}};
 }
 
-Table image2vdbTests() {
-  return {{"--background", "Image2Vdb.bringsInVtiWithABackground"},
-          {"--component", "Image2Vdb.bringsInAComponentThatIsChosen"},
-          {"--dataset", "Image2Vdb.bringsInADatasetThatIsChosen"},
-          {"--dims", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--endian", "Image2Vdb.bringsInRawBehindAHeaderInEitherByteOrder"},
-          {"--force", "Image2Vdb.replacesAFileWhereForced"},
-          {"--name", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--nonfinite", "Image2Vdb.replacesWhatIsNotFiniteWhenAskedAndSaysHowMuch"},
-          {"--normalise", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--skip", "Image2Vdb.bringsInRawBehindAHeaderInEitherByteOrder"},
-          {"--threshold", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--type", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--voxel-size", "Image2Vdb.takesTheEdgesOfVoxelsThatAreGiven"}};
-}
-
 std::vector<Program> programs() {
   return {{"vdb2esvr", VDB2ESVR, "", vdb2esvrTests()},
           {"esvr2vdb", ESVR2VDB, "", esvr2vdbTests()},
@@ -278,8 +262,7 @@ std::vector<Program> programs() {
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
           {"curves", ESVR_COMPARE, "curves", curvesTests()},
-          {"stability", ESVR_COMPARE, "stability", stabilityTests()},
-          {"image2vdb", IMAGE2VDB, "", image2vdbTests()}};
+          {"stability", ESVR_COMPARE, "stability", stabilityTests()}};
 }
 
 /// The short name of each long name, such as "-g" for "--grid"; empty if there is none.
