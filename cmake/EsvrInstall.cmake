@@ -1,6 +1,7 @@
 # Installs the library, its headers, the package for find_package(esvr) and the file for pkg-config.
 # The component `library` has a shared library, `development` has everything else that another
-# project needs, `programs` has the programs, and `python` has the Python module.
+# project needs, `programs` has the programs, `python` has the Python module, and `images` has the programs
+# that are written in Python.
 include(CMakePackageConfigHelpers)
 
 set(packageDir ${CMAKE_INSTALL_LIBDIR}/cmake/esvr)
@@ -76,7 +77,7 @@ esvr_pkg_config(esvr esvr "${privateLibraries}")
 if(TARGET esvr_mpi)
   install(TARGETS esvr_mpi LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT mpi)
 endif()
-set(ESVR_PROGRAMS vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb image2vdb)
+set(ESVR_PROGRAMS vdb2esvr esvr2vdb esvr-render esvr-view esvr-compare esvr-sample swc2vdb)
 set(ESVR_COMPARE_COMMANDS check table curves)
 foreach(program ${ESVR_PROGRAMS})
   if(TARGET ${program})

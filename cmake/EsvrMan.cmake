@@ -1,11 +1,15 @@
-# Makes the man pages of ESVR_PROGRAMS (EsvrInstall.cmake) from their own --help, and that of the
-# format, esvr(5), from docs/format.md. Packages have compressed pages.
+# Makes the man pages of ESVR_PROGRAMS (EsvrInstall.cmake) and ESVR_PYTHON_PROGRAMS (integrations/python)
+# from their own --help, and that of the format, esvr(5), from docs/format.md. Packages have compressed
+# pages.
 set(manPages)
 
-# esvr_man_file(<page> COMMAND <command>... DEPENDS <files>...) makes a page in the folder of its
-# section by a command that prints it.
+# esvr_man_file(<page> [COMPONENT <component>] COMMAND <command>... DEPENDS <files>...) makes a page in the
+# folder of its section by a command that prints it.
 function(esvr_man_file page)
-  cmake_parse_arguments(PARSE_ARGV 1 man "" "" "COMMAND;DEPENDS")
+  cmake_parse_arguments(PARSE_ARGV 1 man "" "COMPONENT" "COMMAND;DEPENDS")
+  if(NOT man_COMPONENT)
+    set(man_COMPONENT programs)
+  endif()
   string(REGEX MATCH "[0-9]$" section ${page})
   set(folder ${PROJECT_BINARY_DIR}/man/man${section})
   file(MAKE_DIRECTORY ${folder})
@@ -16,7 +20,7 @@ function(esvr_man_file page)
     string(APPEND file .gz)
   endif()
   set(manPages ${manPages} ${file} PARENT_SCOPE)
-  install(FILES ${file} DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section} COMPONENT programs)
+  install(FILES ${file} DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section} COMPONENT ${man_COMPONENT})
 endfunction()
 
 function(esvr_man_page page program)
@@ -32,6 +36,22 @@ endforeach()
 foreach(command ${ESVR_COMPARE_COMMANDS})
   esvr_man_page(esvr-compare-${command} esvr-compare ${command})
 endforeach()
+
+if(ESVR_PYTHON_PROGRAMS AND NOT CMAKE_CROSSCOMPILING)
+  execute_process(COMMAND ${Python_EXECUTABLE} -c "import numpy" RESULT_VARIABLE noNumpy
+                  OUTPUT_QUIET ERROR_QUIET)
+  if(noNumpy)
+    message(STATUS "NumPy was not found, so that image2vdb and vdb2image have no man pages")
+  else()
+    file(GLOB programFiles CONFIGURE_DEPENDS integrations/python/esvr/images/*.py)
+    foreach(program ${ESVR_PYTHON_PROGRAMS})
+      # -B: no compiled files in the build folder, which an installation would not have
+      esvr_man_file(${program}.1 COMPONENT images
+                    COMMAND ${Python_EXECUTABLE} -B ${PROJECT_BINARY_DIR}/python/${program} --help man
+                    DEPENDS esvr_python ${programFiles})
+    endforeach()
+  endif()
+endif()
 
 find_program(ESVR_LOWDOWN lowdown)
 mark_as_advanced(ESVR_LOWDOWN)

@@ -88,7 +88,7 @@ ${about}This package has the programs, which convert, draw, show and compare
 files, and a plugin for ParaView.")
 set(CPACK_COMPONENT_PROGRAMS_DEPENDS library)
 set(CPACK_DEBIAN_PROGRAMS_PACKAGE_RECOMMENDS "ffmpeg")
-set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS "paraview, python3-esvr")
+set(CPACK_DEBIAN_PROGRAMS_PACKAGE_SUGGESTS "paraview, python3-esvr, esvr-images")
 install(FILES integrations/paraview/esvr_reader.py COMPONENT programs
         DESTINATION ${CMAKE_INSTALL_DATADIR}/esvr/paraview)
 install(DIRECTORY integrations/paraview/debian12 COMPONENT programs
@@ -104,6 +104,17 @@ and compares volumes as arrays of NumPy.")
       "python3 (>= 3.${Python_VERSION_MINOR}), python3 (<< 3.${pythonNext}), python3-numpy")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/python/postinst
                                                 ${PROJECT_SOURCE_DIR}/cmake/debian/python/prerm)
+
+  esvr_package(images esvr-images graphics "sparse volumes as ellipsoids - images in and out
+${about}This package has image2vdb and vdb2image, which convert images of
+microscopes, scanners and simulations to grids and back. Each format is read
+by the package of Debian that knows it.")
+  set(CPACK_COMPONENT_IMAGES_DEPENDS python)
+  # Packages that bring several hundred megabytes are suggested only.
+  set(CPACK_DEBIAN_IMAGES_PACKAGE_RECOMMENDS
+      "python3-tifffile, python3-nibabel, python3-mrcfile, python3-pydicom, python3-h5py, python3-netcdf4, python3-zarr")
+  set(CPACK_DEBIAN_IMAGES_PACKAGE_SUGGESTS
+      "esvr-tools, python3-gdal, python3-gdcm, python3-vtk9 | python3-paraview")
 endif()
 
 if(TARGET esvr_mpi)

@@ -1,6 +1,7 @@
 # Builds the Python module if it is wanted and pybind11 is there. The module draws, so that a build
 # without the renderer has no module, nor has one with sanitizers, which Python itself would need.
 set(ESVR_WITH_PYTHON OFF)
+set(ESVR_PYTHON_PROGRAMS) # integrations/python
 if(NOT ESVR_PYTHON STREQUAL OFF AND ESVR_BUILD_PROGRAMS AND NOT ESVR_CONVERTERS_ONLY
    AND NOT ESVR_SANITIZE)
   set(PYBIND11_FINDPYTHON ON)

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "vdb/scalar_trees.h"
+#include "vdb/trees.h"
 
 #include ESVR_NANOVDB_CREATE
 

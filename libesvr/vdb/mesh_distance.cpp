@@ -1,7 +1,7 @@
 #include "esvr/mesh_distance.h"
 
 #include "core/parallel.h"
-#include "vdb/scalar_trees.h"
+#include "vdb/trees.h"
 
 #include <openvdb/math/Proximity.h>
 #include <openvdb/tools/MeshToVolume.h>

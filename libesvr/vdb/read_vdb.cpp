@@ -73,7 +73,7 @@ bool countFromStatistics(const std::vector<MetaItem>& items, GridSummary& grid) 
 
 void countFromTree(Archive& archive, const ArchiveEntry& entry, Surveys& surveys,
                    GridSummary& grid) {
-  if (!isScalarFloatTree(entry) && !isVectorTree(entry)) return;
+  if (!isPackedTree(entry)) return;
   const std::uint64_t owner = archive.treeOwner(entry).gridAt;
   auto survey = surveys.find(owner);
   if (survey == surveys.end()) survey = surveys.emplace(owner, surveyTree(archive, entry)).first;
@@ -131,6 +131,15 @@ ValueType valueTypeOf(const GridSummary& grid) {
   return grid.savedAsHalf ? ValueType::kHalf : ValueType::kFloat;
 }
 
+/// The properties of a grid, without its background.
+GridDescriptor descriptorOf(const ListedGrid& listed) {
+  return {.name = listed.summary.name,
+          .gridClass = listed.summary.gridClass,
+          .valueType = valueTypeOf(listed.summary),
+          .transform = listed.head.transform,
+          .metadata = withoutFileStatistics(listed.head.metadata)};
+}
+
 /// \param component  of a grid of vectors; 0 for others
 VolumeGrid readTree(Archive& archive, const ListedGrid& listed, std::size_t component,
                     const ReadOptions& options) {
@@ -138,12 +147,8 @@ VolumeGrid readTree(Archive& archive, const ListedGrid& listed, std::size_t comp
   TreeVoxels voxels =
       readVoxels(archive, archive.entries()[listed.place], {summary.gridClass, component}, options);
   VolumeGrid grid;
-  grid.descriptor.name = summary.name;
-  grid.descriptor.gridClass = summary.gridClass;
-  grid.descriptor.valueType = valueTypeOf(summary);
+  grid.descriptor = descriptorOf(listed);
   grid.descriptor.background = voxels.background;
-  grid.descriptor.transform = listed.head.transform;
-  grid.descriptor.metadata = withoutFileStatistics(listed.head.metadata);
   grid.volume = std::move(voxels.volume);
   grid.nonFiniteReplaced = voxels.nonFiniteReplaced;
   grid.inactive = voxels.inactive;
@@ -194,6 +199,17 @@ VectorGrid readListedVector(Archive& archive, const ListedGrid& listed, ReadOpti
   return vectors;
 }
 
+PackedGrid readListedPacked(Archive& archive, const ListedGrid& listed,
+                            const ReadOptions& options) {
+  return inGridAt(archive, listed.place, [&]() -> PackedGrid {
+    const ArchiveEntry& entry = archive.entries()[listed.place];
+    if (!isPackedTree(entry))
+      throw BadInput("its tree (" + shownName(entry.treeType) +
+                     ") cannot be read; those of numbers, 3D vectors and masks can");
+    return {descriptorOf(listed), readPackedVoxels(archive, entry, options)};
+  });
+}
+
 }  // namespace
 
 VdbSummary inspectOpenVdb(InputFile& file) {
@@ -225,6 +241,11 @@ VectorGrid readOpenVdbVector(InputFile& file, std::size_t place, const ReadOptio
   return readListedVector(archive, listGrid(archive, place), options);
 }
 
+PackedGrid readOpenVdbPacked(InputFile& file, std::size_t place, const ReadOptions& options) {
+  Archive archive(file);
+  return readListedPacked(archive, listGrid(archive, place), options);
+}
+
 }  // namespace esvr::vdb
 
 namespace esvr {
@@ -247,6 +268,12 @@ VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options) {
   vdb::InputFile file(std::span(grid.bytes));
   vdb::Archive archive(file, grid);
   return vdb::readListedVector(archive, vdb::listGrid(archive, 0), options);
+}
+
+PackedGrid readPacked(const CarriedGrid& grid, const ReadOptions& options) {
+  vdb::InputFile file(std::span(grid.bytes));
+  vdb::Archive archive(file, grid);
+  return vdb::readListedPacked(archive, vdb::listGrid(archive, 0), options);
 }
 
 }  // namespace esvr

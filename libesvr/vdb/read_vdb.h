@@ -14,5 +14,6 @@ VolumeGrid readOpenVdbGrid(InputFile& file, std::size_t place, const ReadOptions
 VolumeGrid readOpenVdbComponent(InputFile& file, std::size_t place, std::size_t component,
                                 const ReadOptions& options);
 VectorGrid readOpenVdbVector(InputFile& file, std::size_t place, const ReadOptions& options);
+PackedGrid readOpenVdbPacked(InputFile& file, std::size_t place, const ReadOptions& options);
 
 }  // namespace esvr::vdb

@@ -2,34 +2,77 @@
 /// A grid of OpenVDB that holds no voxels: the leaves get them when they are written, one after the
 /// other. The tree of a large volume then takes a tenth of the memory of its voxels.
 
-#include "vdb/scalar_trees.h"
-#include "vdb/vector_trees.h"
+#include "vdb/trees.h"
 
+#include <algorithm>
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "core/parallel.h"
+#include "esvr/packed_grid.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
 namespace esvr::vdb {
 
+// Voxels that a StreamedGrid writes have these functions: count() is the number of bricks, corner(b) and
+// active(b) describe a brick, find(corner) is its number, and value(b, i, n) is the value at the offset i
+// (voxelOffset), which is the n-th active one of the brick.
+
 /// The numbers of a volume, which must outlive this object.
 struct NumberVoxels {
   const SparseVolume& volume;
 
-  [[nodiscard]] const SparseVolume& bricks() const { return volume; }
-  [[nodiscard]] float value(std::size_t b, int i) const { return volume.brickValues(b)[i]; }
+  [[nodiscard]] std::size_t count() const { return volume.brickCount(); }
+  [[nodiscard]] Coord corner(std::size_t b) const { return volume.brickCorner(b); }
+  [[nodiscard]] const BrickMask& active(std::size_t b) const { return volume.active[b]; }
+  [[nodiscard]] std::size_t find(Coord corner) const {
+    return findBrick(volume, brickOf(corner) - brickOf(volume.origin)).value();
+  }
+  [[nodiscard]] float value(std::size_t b, int i, int) const { return volume.brickValues(b)[i]; }
 };
 
 /// Vectors whose components have the same bricks and active voxels (aligned()).
 struct VectorVoxels {
   VectorVolume components;
 
-  [[nodiscard]] const SparseVolume& bricks() const { return components.front(); }
-  [[nodiscard]] openvdb::Vec3s value(std::size_t b, int i) const {
+  [[nodiscard]] NumberVoxels bricks() const { return {components.front()}; }
+  [[nodiscard]] std::size_t count() const { return bricks().count(); }
+  [[nodiscard]] Coord corner(std::size_t b) const { return bricks().corner(b); }
+  [[nodiscard]] const BrickMask& active(std::size_t b) const {
+    return components.front().active[b];
+  }
+  [[nodiscard]] std::size_t find(Coord corner) const { return bricks().find(corner); }
+  [[nodiscard]] openvdb::Vec3s value(std::size_t b, int i, int) const {
     const auto& [x, y, z] = components;
     return {x.brickValues(b)[i], y.brickValues(b)[i], z.brickValues(b)[i]};
+  }
+};
+
+/// A value of PackedVoxels in OpenVDB's type.
+template <class T>
+auto openVdbValue(const T& value) {
+  if constexpr (std::is_same_v<T, PackedVector>)
+    return openvdb::Vec3s(value.data());
+  else
+    return value;
+}
+
+/// The voxels of a PackedGrid, which must outlive this object.
+template <class T>
+struct StreamedPacked {
+  const PackedVoxels<T>& voxels;
+
+  [[nodiscard]] std::size_t count() const { return voxels.bricks.size(); }
+  [[nodiscard]] Coord corner(std::size_t b) const { return voxels.bricks[b].corner; }
+  [[nodiscard]] const BrickMask& active(std::size_t b) const { return voxels.bricks[b].active; }
+  [[nodiscard]] std::size_t find(Coord corner) const {
+    const auto at = std::ranges::lower_bound(voxels.bricks, corner, {}, &PackedBrick::corner);
+    return std::size_t(at - voxels.bricks.begin());
+  }
+  [[nodiscard]] auto value(std::size_t b, int, int n) const {
+    return openVdbValue(voxels.value(b, n));
   }
 };
 
@@ -38,11 +81,11 @@ template <class Leaf, class Voxels>
 std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
                                const typename Leaf::ValueType& background) {
   using Value = typename Leaf::ValueType;
-  const Coord corner = voxels.bricks().brickCorner(b);
+  const Coord corner = voxels.corner(b);
   auto leaf = std::make_unique<Leaf>(openvdb::Coord(corner.x, corner.y, corner.z), background);
-  const BrickMask& active = voxels.bricks().active[b];
-  for (int i = 0; i < kBrickVoxels; ++i)
-    if (active.test(i)) leaf->setValueOn(openvdb::Index(i), Value(voxels.value(b, i)));
+  forEachActive(voxels.active(b), [&, n = 0](int i) mutable {
+    leaf->setValueOn(openvdb::Index(i), Value(voxels.value(b, i, n++)));
+  });
   return leaf;
 }
 
@@ -50,20 +93,20 @@ std::unique_ptr<Leaf> makeLeaf(const Voxels& voxels, std::size_t b,
 /// nothing of a grid without a leaf, and all of its tiles if there is one. It draws the border of a
 /// leaf farther out than that of a tile, so that a single leaf among tiles stands out.
 /// All bricks of a small grid therefore remain leaves, and one of a larger grid.
-template <class Tree>
-void keepLeaves(const SparseVolume& volume, Tree& tree) {
+template <class Tree, class Voxels>
+void keepLeaves(const Voxels& voxels, Tree& tree) {
   constexpr std::size_t kMostLeaves = 512;  // a constant leaf takes about 200 bytes of a file
   if (tree.cbeginLeaf()) return;
-  const bool keepsAll = volume.brickCount() <= kMostLeaves;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    if (volume.active[b].count() == 0) continue;
-    const Coord corner = volume.brickCorner(b);
+  const bool keepsAll = voxels.count() <= kMostLeaves;
+  for (std::size_t b = 0; b < voxels.count(); ++b) {
+    if (voxels.active(b).count() == 0) continue;
+    const Coord corner = voxels.corner(b);
     tree.touchLeaf(openvdb::Coord(corner.x, corner.y, corner.z));
     if (!keepsAll) return;
   }
 }
 
-/// \tparam Voxels  NumberVoxels or VectorVoxels
+/// \tparam Voxels  NumberVoxels, VectorVoxels or StreamedPacked
 template <class Tree, class Voxels>
 class StreamedGrid : public openvdb::Grid<Tree> {
  public:
@@ -75,13 +118,13 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   StreamedGrid(Voxels voxels, const Value& background, bool constantTiles)
       : openvdb::Grid<Tree>(background), voxels_(std::move(voxels)) {
     openvdb::tree::ValueAccessor<Tree> accessor(this->tree());
-    for (std::size_t b = 0; b < voxels_.bricks().brickCount(); ++b) {
+    for (std::size_t b = 0; b < voxels_.count(); ++b) {
       throwIfCancelled();
       add(b, constantTiles, accessor);
     }
     if (!constantTiles) return;
     mergeTiles();
-    keepLeaves(voxels_.bricks(), this->tree());
+    keepLeaves(voxels_, this->tree());
   }
 
   /// The bytes that the grid takes where it is read again, with its voxels.
@@ -93,9 +136,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
     for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf) {
       throwIfCancelled();
       const Coord corner{leaf->origin().x(), leaf->origin().y(), leaf->origin().z()};
-      const auto b =
-          findBrick(voxels_.bricks(), brickOf(corner) - brickOf(voxels_.bricks().origin));
-      makeLeaf<Leaf>(voxels_, b.value(), this->background())
+      makeLeaf<Leaf>(voxels_, voxels_.find(corner), this->background())
           ->writeBuffers(stream, this->saveFloatAsHalf());
     }
   }
@@ -104,14 +145,14 @@ class StreamedGrid : public openvdb::Grid<Tree> {
   using Accessor = openvdb::tree::ValueAccessor<Tree>;
 
   void add(std::size_t b, bool constantTiles, Accessor& accessor) {
-    const BrickMask& active = voxels_.bricks().active[b];
+    const BrickMask& active = voxels_.active(b);
     const int count = active.count();
     if (count == 0) return;
-    const Coord c = voxels_.bricks().brickCorner(b);
+    const Coord c = voxels_.corner(b);
     const openvdb::Coord corner(c.x, c.y, c.z);
     constexpr openvdb::Index kTileOfABrick = 1;  // level in the tree
     if (constantTiles && count == kBrickVoxels && isConstant(b))
-      return accessor.addTile(kTileOfABrick, corner, Value(voxels_.value(b, 0)), true);
+      return accessor.addTile(kTileOfABrick, corner, Value(voxels_.value(b, 0, 0)), true);
     auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate{}, corner, this->background());
     leaf->setValueMask(maskOf(active));
     accessor.addLeaf(leaf.release());
@@ -119,7 +160,7 @@ class StreamedGrid : public openvdb::Grid<Tree> {
 
   [[nodiscard]] bool isConstant(std::size_t b) const {
     for (int i = 1; i < kBrickVoxels; ++i)
-      if (voxels_.value(b, i) != voxels_.value(b, 0)) return false;
+      if (voxels_.value(b, i, i) != voxels_.value(b, 0, 0)) return false;
     return true;
   }
 

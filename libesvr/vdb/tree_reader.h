@@ -13,7 +13,10 @@ bool isScalarFloatTree(const ArchiveEntry& entry);
 /// True if the components of the grid's tree can be fitted.
 bool isVectorTree(const ArchiveEntry& entry);
 
-/// Surveys the tree of an entry for which isScalarFloatTree or isVectorTree is true.
+/// True if readPackedVoxels can read the grid's tree.
+bool isPackedTree(const ArchiveEntry& entry);
+
+/// Surveys the tree of an entry for which isPackedTree is true.
 /// \throws BadInput  the tree is truncated or damaged
 TreeSurvey surveyTree(Archive& archive, const ArchiveEntry& entry);
 
@@ -35,5 +38,13 @@ struct WantedVoxels {
 /// \throws MemoryExceeded  it takes more than options.maxBytes
 TreeVoxels readVoxels(Archive& archive, const ArchiveEntry& entry, const WantedVoxels& wanted,
                       const ReadOptions& options);
+
+/// Reads the active voxels of an entry for which isPackedTree is true. Doubles of vectors are rounded to
+/// floats; all other values are those of the file, also if they are not finite. Of a mask, the true
+/// voxels among the active ones are read.
+/// \throws BadInput  the tree is damaged
+/// \throws MemoryExceeded  it takes more than options.maxBytes
+AnyPackedVoxels readPackedVoxels(Archive& archive, const ArchiveEntry& entry,
+                                 const ReadOptions& options);
 
 }  // namespace esvr::vdb

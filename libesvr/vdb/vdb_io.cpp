@@ -104,6 +104,26 @@ VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                         : readGrid(path, grid.place, options);
 }
 
+PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
+                      const ReadOptions& options) {
+  return vdb::readingFrom(path, [&](vdb::InputFile& file) {
+    if (vdb::formatOf(file) == vdb::FileFormat::kOpenVdb)
+      return vdb::readOpenVdbPacked(file, place, options);
+    ReadOptions anyNumber = options;
+    anyNumber.allowEmpty = true;
+    const VolumeGrid grid = vdb::readNanoVdbGrid(file, place, anyNumber);
+    return packed(grid.descriptor, grid.volume);
+  });
+}
+
+PackedGrid readPacked(const std::filesystem::path& path, const std::string& name,
+                      const ReadOptions& options) {
+  const NamedGrid grid = vdb::namedIn(path, name);
+  if (!grid.component) return readPacked(path, grid.place, options);
+  const VolumeGrid volume = readComponent(path, grid.place, *grid.component, options);
+  return packed(volume.descriptor, volume.volume);
+}
+
 VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
                          std::size_t component, const ReadOptions& options) {
   return vdb::readVectors(path, [&](vdb::InputFile& file) {

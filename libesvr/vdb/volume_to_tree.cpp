@@ -2,8 +2,7 @@
 
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
-#include "vdb/scalar_trees.h"
-#include "vdb/vector_trees.h"
+#include "vdb/trees.h"
 
 #include <cmath>
 
@@ -60,7 +59,7 @@ typename openvdb::Grid<Tree>::Ptr makeGrid(const VolumeGrid& source, const Write
     openvdb::tools::signedFloodFill(tree);
   if (options.constantTiles) {
     openvdb::tools::prune(tree);
-    keepLeaves(source.volume, tree);
+    keepLeaves(NumberVoxels{source.volume}, tree);
   }
   return grid;
 }
@@ -120,6 +119,13 @@ GridBase::Ptr makeVectors(const VectorGrid& source, const WriteOptions& options)
       VectorVoxels{aligned(source.components)}, Vector(background), options.constantTiles);
 }
 
+template <class T>
+GridBase::Ptr makePacked(const PackedVoxels<T>& voxels, const WriteOptions& options) {
+  using Tree = typename openvdb::tree::Tree4<decltype(openVdbValue(voxels.background))>::Type;
+  return std::make_shared<StreamedGrid<Tree, StreamedPacked<T>>>(
+      StreamedPacked<T>{voxels}, openVdbValue(voxels.background), options.constantTiles);
+}
+
 }  // namespace
 
 GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& options,
@@ -151,6 +157,17 @@ GridBase::Ptr makeOpenVdbGrid(const VectorGrid& source, const WriteOptions& opti
     return passed;
   };
   chooseHalf(source.descriptor, options, all, *grid);
+  return grid;
+}
+
+GridBase::Ptr makeOpenVdbGrid(const PackedGrid& source, const WriteOptions& options) {
+  initializeOpenVdb();
+  const GridBase::Ptr grid =
+      std::visit([&](const auto& voxels) { return makePacked(voxels, options); }, source.voxels);
+  restoreDescriptor(source.descriptor, *grid);
+  // Halfs remain only where they were read, so that they hold all values.
+  if (source.descriptor.valueType != ValueType::kHalf && grid->saveFloatAsHalf())
+    grid->setSaveFloatAsHalf(false);
   return grid;
 }
 

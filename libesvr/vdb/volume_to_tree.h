@@ -27,4 +27,8 @@ openvdb::GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& grid, const WriteOption
 /// \throws UsageError  as for a grid of numbers
 openvdb::GridBase::Ptr makeOpenVdbGrid(const VectorGrid& grid, const WriteOptions& options);
 
+/// A grid of the type of the voxels. Its leaves get their voxels when it is written.
+/// \param grid  must outlive the result
+openvdb::GridBase::Ptr makeOpenVdbGrid(const PackedGrid& grid, const WriteOptions& options);
+
 }  // namespace esvr::vdb

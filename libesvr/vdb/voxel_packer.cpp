@@ -8,8 +8,9 @@
 #include "esvr/error.h"
 #include "vdb/errors.h"
 #include "vdb/make_nano.h"
-#include "vdb/scalar_trees.h"
 #include "vdb/stream_archive.h"
+#include "vdb/trees.h"
+#include "vdb/trees.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {

@@ -1,5 +1,6 @@
 #include "vdb/write_nvdb.h"
 
+#include <deque>
 #include <fstream>
 
 #include "esvr/error.h"
@@ -19,7 +20,19 @@ void refuseWhatNanoVdbLacks(const VolumeGrid& grid, const WriteOptions& options)
                      grid.descriptor.transform.mapType + "; ask for .vdb");
 }
 
-std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
+VolumeGrid unpackedGrid(const PackedGrid& grid) {
+  const auto* voxels = std::get_if<PackedVoxels<float>>(&grid.voxels);
+  if (!voxels)
+    throw UsageError("grid \"" + shownName(grid.descriptor.name) + "\" has values of type " +
+                     valueTypeOf(grid) + ", which are not written to .nvdb files; ask for .vdb");
+  VolumeGrid volume{grid.descriptor, unpacked(*voxels)};
+  volume.descriptor.background = double(voxels->background);
+  return volume;
+}
+
+/// \param unpackedGrids  gets the volumes of packed grids
+std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids,
+                                         std::deque<VolumeGrid>& unpackedGrids) {
   std::vector<const VolumeGrid*> volumes;
   for (const auto& grid : grids) {
     if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
@@ -29,7 +42,10 @@ std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
     if (const auto* vectors = std::get_if<const VectorGrid*>(&grid))
       throw UsageError("grid \"" + shownName((*vectors)->descriptor.name) +
                        "\" has vectors, which are not written to .nvdb files; ask for .vdb");
-    volumes.push_back(std::get<const VolumeGrid*>(grid));
+    if (const auto* packed = std::get_if<const PackedGrid*>(&grid))
+      volumes.push_back(&unpackedGrids.emplace_back(unpackedGrid(**packed)));
+    else
+      volumes.push_back(std::get<const VolumeGrid*>(grid));
   }
   return volumes;
 }
@@ -39,7 +55,8 @@ std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids) {
 void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite> grids,
                   const WriteOptions& options) {
   if (grids.empty()) throw BadInput("a .nvdb file cannot be written without a grid; ask for .vdb");
-  const auto volumes = volumesOf(grids);
+  std::deque<VolumeGrid> unpackedGrids;
+  const auto volumes = volumesOf(grids, unpackedGrids);
   for (const VolumeGrid* grid : volumes) refuseWhatNanoVdbLacks(*grid, options);
   WriteOptions whole = options;
   whole.half = HalfMode::kOff;

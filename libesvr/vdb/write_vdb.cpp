@@ -24,6 +24,7 @@ struct NameOf {
   const std::string& operator()(const CarriedGrid* grid) const { return grid->name; }
   const std::string& operator()(const VolumeGrid* grid) const { return grid->descriptor.name; }
   const std::string& operator()(const VectorGrid* grid) const { return grid->descriptor.name; }
+  const std::string& operator()(const PackedGrid* grid) const { return grid->descriptor.name; }
 };
 
 /// Adds a grid of any kind to a file.
@@ -36,6 +37,7 @@ struct AddTo {
     writer.add(makeOpenVdbGrid(*grid, options, LeafVoxels::kWhenWritten));
   }
   void operator()(const VectorGrid* grid) const { writer.add(makeOpenVdbGrid(*grid, options)); }
+  void operator()(const PackedGrid* grid) const { writer.add(makeOpenVdbGrid(*grid, options)); }
 };
 
 }  // namespace

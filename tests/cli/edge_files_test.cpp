@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "vdb/scalar_trees.h"
+#include "vdb/trees.h"
 
 #include <openvdb/io/File.h>
 

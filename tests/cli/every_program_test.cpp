@@ -51,7 +51,6 @@ class EveryProgram : public test::FolderTest, public testing::WithParamInterface
   void SetUp() override {
     test::writeInput(at("in.vdb"), {{.voxels = softBall({})}});
     ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
-    test::writeText(at("in.raw"), "12345678");
   }
   [[nodiscard]] test::ProgramRun run(const std::vector<std::string>& more) const {
     std::vector<std::string> arguments = GetParam().arguments;
@@ -125,10 +124,6 @@ INSTANTIATE_TEST_SUITE_P(
             "curves",
             ESVR_COMPARE,
             {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}},
-        ProgramCommand{
-            "image2vdb",
-            IMAGE2VDB,
-            {"DIR/in.raw", "DIR/o.vdb", "--dims", "2,2,2", "--type", "uint8", "--force"}}),
     [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace

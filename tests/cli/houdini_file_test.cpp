@@ -12,8 +12,7 @@
 #include "cli/folder_test.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
-#include "vdb/scalar_trees.h"
-#include "vdb/vector_trees.h"
+#include "vdb/trees.h"
 
 namespace esvr {
 namespace {

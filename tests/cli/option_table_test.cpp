@@ -231,20 +231,6 @@ Table curvesTests() {
           {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}};
 }
 
-Table image2vdbTests() {
-  return {{"--background", "Image2Vdb.bringsInVtiWithABackground"},
-          {"--component", "Image2Vdb.bringsInAComponentThatIsChosen"},
-          {"--dataset", "Image2Vdb.bringsInADatasetThatIsChosen"},
-          {"--dims", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--endian", "Image2Vdb.bringsInRawBehindAHeaderInEitherByteOrder"},
-          {"--force", "Image2Vdb.replacesAFileWhereForced"},
-          {"--name", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--nonfinite", "Image2Vdb.replacesWhatIsNotFiniteWhenAskedAndSaysHowMuch"},
-          {"--normalise", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--skip", "Image2Vdb.bringsInRawBehindAHeaderInEitherByteOrder"},
-          {"--threshold", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--type", "Image2Vdb.bringsInRawWithThresholdAndNormalised"},
-          {"--voxel-size", "Image2Vdb.takesTheEdgesOfVoxelsThatAreGiven"}};
 }
 
 std::vector<Program> programs() {
@@ -255,7 +241,6 @@ std::vector<Program> programs() {
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
           {"curves", ESVR_COMPARE, "curves", curvesTests()},
-          {"image2vdb", IMAGE2VDB, "", image2vdbTests()}};
 }
 
 /// The short name of each long name, such as "-g" for "--grid"; empty if there is none.

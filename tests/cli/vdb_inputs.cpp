@@ -3,8 +3,7 @@
 #include <cmath>
 
 #include "vdb/empty_grid.h"
-#include "vdb/scalar_trees.h"
-#include "vdb/vector_trees.h"
+#include "vdb/trees.h"
 
 namespace esvr::test {
 namespace {

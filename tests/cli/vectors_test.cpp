@@ -16,7 +16,7 @@
 #include "esvr/container.h"
 #include "esvr/vdb_io.h"
 #include "esvr/vector_metrics.h"
-#include "vdb/vector_trees.h"
+#include "vdb/trees.h"
 
 namespace esvr {
 namespace {

@@ -1,7 +1,4 @@
 """The files that the examples of --help read, by name."""
-import gzip
-import pathlib
-import re
 import shutil
 import struct
 import subprocess
@@ -27,14 +24,6 @@ else:
 PRESETS = """[{"Name": "Smoke", "ColorSpace": "RGB", "RGBPoints": [0, 0, 0, 0, 1, 1, 1, 1],
 "Points": [0, 0, 0.5, 0, 1, 1, 0.5, 0]}]"""
 SKELETON = "1 1 0 0 0 5 -1\n2 3 40 0 0 2 1\n3 3 60 30 10 1 2\n"
-NRRD = f"""NRRD0004
-type: float
-dimension: 3
-sizes: {IMAGE_SIDE} {IMAGE_SIDE} {IMAGE_SIDE}
-endian: little
-encoding: raw
-data file: out.raw
-"""
 
 
 def program(*words):
@@ -52,45 +41,11 @@ def ball():
     return struct.pack(f"<{IMAGE_SIDE ** 3}f", *(min(400.0, value) for value in values))
 
 
-def tiff_page(side, at):
-    """A page of 16-bit values of a TIFF file that begins at a byte, without a page after it."""
-    entries = [(256, side), (257, side), (258, 16), (262, 1), (273, at + 8 + 12 * 8), (277, 1),
-               (278, side), (279, 2 * side * side)]
-    directory = struct.pack("<H", len(entries))
-    directory += b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
-    directory += struct.pack("<I", 0)
-    return directory.ljust(8 + 12 * 8, b"\0") + struct.pack("<H", 400) * (side * side)
-
-
-def tiff():
-    return struct.pack("<2sHI", b"II", 42, 8) + tiff_page(8, 8)
-
-
-def nifti():
-    """A NIfTI-1 image of 8 x 8 x 8 bytes."""
-    header = bytearray(352)
-    struct.pack_into("<i", header, 0, 348)
-    struct.pack_into("<8h", header, 40, 3, 8, 8, 8, 1, 1, 1, 1)
-    struct.pack_into("<hh", header, 70, 2, 8)  # type and bits of a value
-    struct.pack_into("<8f", header, 76, *[1.0] * 8)
-    struct.pack_into("<f", header, 108, 352.0)
-    header[344:348] = b"n+1\0"
-    return gzip.compress(bytes(header) + bytes([200]) * 8 ** 3)
-
-
-VTI = """<?xml version="1.0"?>
-<VTKFile type="ImageData" version="0.1" byte_order="LittleEndian">
-<ImageData WholeExtent="0 3 0 3 0 3" Origin="0 0 0" Spacing="1 1 1"><Piece Extent="0 3 0 3 0 3">
-<PointData><DataArray type="Float32" Name="p" format="ascii">%s</DataArray></PointData>
-</Piece></ImageData></VTKFile>
-""" % " ".join(str(1 + i % 3) for i in range(64))
-
-
 class Inputs:
     """Makes each file once in a folder of its own, and copies it to the examples."""
 
-    def __init__(self, folder, copy_grids):
-        self.folder, self.copy_grids = folder, copy_grids
+    def __init__(self, folder, make_grids):
+        self.folder, self.make_grids = folder, make_grids
         folder.mkdir()
 
     def provide(self, name, folder, is_sequence):
@@ -112,13 +67,8 @@ class Inputs:
             return lambda path: self.grids(path, GRIDS[name])
         if name in FITTED:
             return lambda path: self.fit(path, FITTED[name])
-        if match := re.fullmatch(r"\w+_(\d+)x(\d+)x(\d+)_uint8\.raw", name):
-            size = int(match[1]) * int(match[2]) * int(match[3])
-            return lambda path: path.write_bytes(bytes([200]) * size)
-        if name in BYTES:
-            return lambda path: path.write_bytes(BYTES[name])
-        return {"slices/ct_####.tif": self.slices, "smoke.####.vdb": self.frames, "ct.vdb": self.image, "ct.nhdr": self.header,
-                "out.raw": lambda path: path.write_bytes(ball()), "back.vdb": self.back}.get(name)
+        return {"smoke.####.vdb": self.frames, "ct.vdb": self.image, "out.raw": lambda path: path.write_bytes(ball()),
+                "back.vdb": self.back}.get(name)
 
     def text(self, path, text):
         path.parent.mkdir(exist_ok=True)
@@ -128,25 +78,16 @@ class Inputs:
     def grids(self, path, names):
         source = self.folder / "of-plume.vdb"
         program("esvr-sample", "plume", source, "--resolution", PLUME, "--force")
-        program(self.copy_grids, source, path, *names)
+        program(self.make_grids, source, path, *names)
 
     def frames(self, path):
         program("esvr-sample", "plume", path, "--resolution", PLUME, "--frames", FRAMES)
 
-    def slices(self, path):
-        path.parent.mkdir()
-        for number in range(1, 4):
-            path.with_name(f"ct_{number:04}.tif").write_bytes(tiff())
-
-    def header(self, path):
-        path.with_name("out.raw").write_bytes(ball())
-        path.write_text(NRRD)
-
     def image(self, path):
-        header = self.folder / "of-ct.vdb/ct.nhdr"
-        header.parent.mkdir(exist_ok=True)
-        self.header(header)
-        program("image2vdb", header, path, "--threshold", "-1")
+        raw = path.with_suffix(".raw")
+        raw.write_bytes(ball())
+        program(self.make_grids, raw, path, IMAGE_SIDE)
+        raw.unlink()
 
     def fit(self, path, source):
         """Ellipsoids with the quality that examples of limits ask for. An image takes long to fit."""
@@ -169,8 +110,6 @@ class Inputs:
 
 
 TEXTS = {"presets.json": PRESETS, "neuron.swc": SKELETON, "compressors/sz3": COMPRESSOR}
-BYTES = {"scan.tif": tiff(), "brain.nii.gz": nifti(), "pressure.vti": VTI.encode(),
-         "cells.h5": pathlib.Path(__file__).with_name("cells.h5").read_bytes()}
 GRIDS = {"smoke.vdb": ["density"], "ref.vdb": ["density"], "new.vdb": ["smoke"], "big.vdb": ["density"],
          "frame.vdb": ["density", "velocity"], "fire.vdb": ["density", "temperature"]}
 FITTED = {"smoke.esvr": "smoke.vdb", "frames smoke.esvr": "smoke.####.vdb",

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""run_examples.py "PROGRAM [COMMAND]" COPY_GRIDS PROGRAM...: runs the examples of a program's --help.
+"""run_examples.py "PROGRAM [COMMAND]" MAKE_GRIDS PROGRAM...: runs the examples of a program's --help.
 
 Each example runs in a shell, in a folder of its own that has the files which the example reads
 (inputs.py). A name that inputs.py does not know is an error of the program that is run. Numbers that
@@ -24,7 +24,7 @@ LIMIT_S = 120
 QUICK = {"--seconds": "1", "--count": "200", "--turntable": "3", "--psnr": "40", "--fps": "32",
          "--min-radius": "0.5"}
 SAMPLERS = ("esvr-sample", "swc2vdb")
-CONVERTERS = SAMPLERS + ("vdb2esvr", "esvr2vdb", "esvr-render", "image2vdb")
+CONVERTERS = SAMPLERS + ("vdb2esvr", "esvr2vdb", "esvr-render")
 
 
 def examples_of(program):
@@ -95,11 +95,11 @@ def check(example, inputs, folder):
 
 
 def main():
-    program, copy_grids, *paths = sys.argv[1:]
+    program, make_grids, *paths = sys.argv[1:]
     path = [str(pathlib.Path(p).parent) for p in paths]
     with tempfile.TemporaryDirectory() as temporary:
         scratch = pathlib.Path(temporary)
-        inputs = Inputs(scratch / "inputs", copy_grids)
+        inputs = Inputs(scratch / "inputs", make_grids)
         opener = scratch / "bin/xdg-open"  # so that no browser is opened
         opener.parent.mkdir()
         opener.write_text("#!/bin/sh\n")

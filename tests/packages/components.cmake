@@ -46,7 +46,7 @@ endfunction()
 set(library "lib(/[^/]+)?")
 list(TRANSFORM programs PREPEND "bin/" OUTPUT_VARIABLE binaries)
 list(TRANSFORM programs REPLACE "(.+)" "share/man/man1/\\1[.]1(.gz)?" OUTPUT_VARIABLE pages)
-list(TRANSFORM programs PREPEND "share/bash-completion/completions/" OUTPUT_VARIABLE completions)
+list(TRANSFORM completed PREPEND "share/bash-completion/completions/" OUTPUT_VARIABLE completions)
 
 set(all)
 check(development "include/esvr/[a-z_]+[.]h" "${library}/cmake/esvr/[A-Za-z-]+[.]cmake"
@@ -56,5 +56,7 @@ check(programs ${binaries} ${pages} ${completions} "share/bash-completion/comple
       "share/zsh/(site-functions|vendor-completions)/_esvr")
 if(withPython)
   check(python "lib/python3/dist-packages/esvr/([a-z_]+[.]py|_core[.]pyi|py[.]typed)"
-        "lib/python3/dist-packages/esvr/_core[.][a-z0-9_-]+[.]so")
+        "lib/python3/dist-packages/esvr/_core[.][a-z0-9_-]+[.]so"
+        "lib/python3/dist-packages/esvr/images/[a-z0-9_]+[.]py")
+  check(images "bin/(image2vdb|vdb2image)" "share/man/man1/(image2vdb|vdb2image)[.]1(.gz)?")
 endif()

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Runs the tests of this folder: run.py FOLDER, where FOLDER has the package esvr.
+"""Runs the tests of a folder: run.py PACKAGES REPORT TESTS OPTION..., where PACKAGES is a folder that has the package esvr,
+and REPORT is a file for the results, of which .ci/check_skips reads what was skipped.
 
 Exits with 77 if pytest or NumPy is missing, so that CTest shows the tests as skipped.
 """
-import pathlib
 import sys
 
 sys.dont_write_bytecode = True
@@ -14,4 +14,4 @@ try:
 except ImportError as missing:
     print(f"skipped: {missing} (Debian: python3-numpy, python3-pytest)")
     sys.exit(77)
-sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", str(pathlib.Path(__file__).parent)]))
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-rs", f"--junit-xml={sys.argv[2]}", *sys.argv[3:]]))

@@ -1,7 +1,7 @@
 #pragma once
 /// Makes files with OpenVDB itself, so that the reader is tested with files of another writer.
 
-#include "vdb/scalar_trees.h"
+#include "vdb/trees.h"
 
 #include <cstddef>
 #include <filesystem>

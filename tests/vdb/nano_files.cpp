@@ -1,7 +1,7 @@
 #include "vdb/nano_files.h"
 
 #include "vdb/make_nano.h"
-#include "vdb/scalar_trees.h"
+#include "vdb/trees.h"
 
 #include ESVR_NANOVDB_CREATE
 

@@ -11,7 +11,7 @@
 #include "esvr/error.h"
 #include "support/temporary_folder.h"
 #include "vdb/made_files.h"
-#include "vdb/vector_trees.h"
+#include "vdb/trees.h"
 
 namespace esvr {
 namespace {

@@ -10,13 +10,13 @@ All coordinates are those of the index space: voxel (i, j, k) lies at (i, j, k),
 x, y, z.
 """
 from . import _html, _openvdb
-from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, MemoryExceeded,
-                    Metrics, Sequence, TargetMissed, UsageError, Volume, __version__, compare, fit, frames,
-                    read, write)
+from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, GridBuilder,
+                    MemoryExceeded, Metrics, PackedGrid, Sequence, TargetMissed, UsageError, Volume,
+                    __version__, compare, fit, frames, list_grids, read, write, write_vdb)
 
-__all__ = ["BadInput", "Cancelled", "DeviceError", "Ellipsoids", "Error", "File", "Grid",
-           "MemoryExceeded", "Metrics", "Sequence", "TargetMissed", "UsageError", "Volume", "__version__",
-           "compare", "fit", "frames", "read", "write"]
+__all__ = ["BadInput", "Cancelled", "DeviceError", "Ellipsoids", "Error", "File", "Grid", "GridBuilder",
+           "MemoryExceeded", "Metrics", "PackedGrid", "Sequence", "TargetMissed", "UsageError", "Volume",
+           "__version__", "compare", "fit", "frames", "list_grids", "read", "write", "write_vdb"]
 
 Volume._repr_html_ = _html.of_volume
 Grid._repr_html_ = _html.of_grid

@@ -17,6 +17,7 @@ PYBIND11_MODULE(_core, module) {
   module.attr("__version__") = ESVR_VERSION;
   addErrors(module);
   addVolume(module);
+  addPacked(module);
   addGrid(module);
   addFiles(module);
   addFit(module);

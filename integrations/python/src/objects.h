@@ -78,6 +78,7 @@ std::vector<std::string> saveFile(const File& file, const std::filesystem::path&
 // Each adds its functions and classes to the module.
 void addErrors(py::module_& module);
 void addVolume(py::module_& module);
+void addPacked(py::module_& module);
 void addGrid(py::module_& module);
 void addFiles(py::module_& module);
 void addFit(py::module_& module);

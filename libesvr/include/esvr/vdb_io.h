@@ -15,6 +15,7 @@
 #include "esvr/coord.h"
 #include "esvr/grid_descriptor.h"
 #include "esvr/inactive_values.h"
+#include "esvr/packed_grid.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/vector_grid.h"
 
@@ -123,6 +124,19 @@ struct VolumeGrid {
 [[nodiscard]] VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
                                     const ReadOptions& options = {});
 
+/// Reads the active voxels of a grid in their type: numbers of all kinds with all their bits, also if they
+/// are not finite, vectors (those of type "vec3d" as floats), and the true voxels of a mask ("bool"). The
+/// grid may have no active voxel. The sign of inactive voxels, which tells the inside of a level set from
+/// the outside, is lost. A grid of a .nvdb file is read as readGrid reads it.
+/// \param options  `maxBytes` is used; voxels are always in memory
+/// \throws BadInput  as for inspectVdb; the file has no grid at this place; its type is another one
+/// \throws MemoryExceeded  the grid needs more than maxBytes
+[[nodiscard]] PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
+                                    const ReadOptions& options = {});
+/// The same for a grid, or a component, that a user has named. \throws  as above; as for readGrid by a name
+[[nodiscard]] PackedGrid readPacked(const std::filesystem::path& path, const std::string& name,
+                                    const ReadOptions& options = {});
+
 /// Reads grids of a .vdb file as bytes. Their types may be unknown to OpenVDB, and their trees are
 /// not checked.
 /// \param places   indices of the grids in VdbSummary::grids
@@ -143,6 +157,9 @@ struct VolumeGrid {
 
 /// Reads the voxels of a carried grid of vectors. \throws  as for readVector
 [[nodiscard]] VectorGrid readVector(const CarriedGrid& grid, const ReadOptions& options = {});
+
+/// Reads the voxels of a carried grid of any type that readPacked takes. \throws  as for readPacked
+[[nodiscard]] PackedGrid readPacked(const CarriedGrid& grid, const ReadOptions& options = {});
 
 /// Choice of half floats for a written file; kAuto: half for ValueType::kHalf, unless a value is
 /// beyond 65504, and for other grids whose metadata say half if half floats hold every value exactly.
@@ -169,16 +186,17 @@ struct WriteOptions {
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const VolumeGrid> grids, const WriteOptions& options = {});
 
-/// A grid that is written: one of numbers or of vectors, or one that is carried, whose bytes are
-/// written as they are. The grid must outlive this object.
-using GridToWrite = std::variant<const VolumeGrid*, const CarriedGrid*, const VectorGrid*>;
+/// A grid that is written: one of numbers or of vectors, one of any type whose active voxels are packed, or
+/// one that is carried, whose bytes are written as they are. The grid must outlive this object.
+using GridToWrite =
+    std::variant<const VolumeGrid*, const CarriedGrid*, const VectorGrid*, const PackedGrid*>;
 
 /// Writes grids of all kinds, in this order. A voxel of a grid of vectors is active if it is active
 /// in any component.
 /// \throws RuntimeFailure  as for writeGrids; a carried grid has a version of the VDB format that
 ///                         this version of OpenVDB does not write
-/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried or has
-///                      vectors
+/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried, has vectors or
+///                      is packed and not of type "float"
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const GridToWrite> grids, const WriteOptions& options = {});
 

@@ -1,6 +1,0 @@
-#include "vdb/scalar_trees.h"
-
-template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
-template class openvdb::tree::Tree<openvdb::DoubleTree::RootNodeType>;
-template class openvdb::Grid<openvdb::FloatTree>;
-template class openvdb::Grid<openvdb::DoubleTree>;

@@ -1,0 +1,161 @@
+"""What the tests of image2vdb and vdb2image share: a small image, conversions in this process, and runs of the programs."""
+import dataclasses
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import esvr
+from esvr.images import image2vdb, vdb2image
+from esvr.images.image import LPS_TO_RAS
+
+
+def ramp(dtype="u2", size=(6, 5, 4)):
+    """An image with the axes z, y, x, in which every voxel has a value of its own above 0: 100 z + 10 y + x + 1."""
+    z, y, x = np.mgrid[0:size[2], 0:size[1], 0:size[0]]
+    return (100 * z + 10 * y + x + 1).astype(dtype)
+
+
+def tilted(spacing=(0.5, 0.75, 2.0), origin=(-6.0, 100.0, 7.0)):
+    """A matrix from voxels to RAS that turns around two axes."""
+    a, b = np.deg2rad(30), np.deg2rad(20)
+    turn = np.array([[np.cos(a), -np.sin(a), 0], [np.sin(a), np.cos(a), 0], [0, 0, 1]]) @ \
+        np.array([[1, 0, 0], [0, np.cos(b), -np.sin(b)], [0, np.sin(b), np.cos(b)]])
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn * spacing, origin
+    return matrix
+
+
+@dataclasses.dataclass
+class Converted:
+    """A grid: values with the axes z, y, x over the box of the image, active voxels, matrix, and the texts that were printed."""
+    grid: object
+    warnings: list
+    notes: list
+    missing: int
+
+    @property
+    def box(self):
+        size = self.grid.metadata["image_size"]
+        return (0, 0, 0), tuple(int(n) - 1 for n in size)
+
+    @property
+    def values(self):
+        values = self.grid.to_numpy(self.box)
+        return values.transpose(2, 1, 0) if values.ndim == 3 else values.transpose(2, 1, 0, 3)
+
+    @property
+    def active(self):
+        return self.grid.active(self.box).transpose(2, 1, 0)
+
+    @property
+    def matrix(self):
+        return np.array(self.grid.transform)
+
+    @property
+    def spacing(self):
+        return np.linalg.norm(self.matrix[:3, :3], axis=0)
+
+    @property
+    def unit(self):
+        return self.grid.metadata.get("length_unit")
+
+
+class Quiet:
+    def progress(self, *_):
+        pass
+
+
+def convert_all(*words):
+    """All grids of an image, time after time."""
+    arguments = image2vdb.PROGRAM.parse([str(word) for word in words] + ["out.vdb"])
+    image = image2vdb.open_image(arguments.files[:-1], arguments)
+    made = []
+    for _, parts in image2vdb.chosen_parts(image, arguments):
+        for name, part in parts:
+            grid, tally, _ = image2vdb.convert(name, part, arguments, Quiet())
+            made.append(Converted(grid, image.warnings, image.notes, tally.missing))
+    return made
+
+
+def convert(*words):
+    made = convert_all(*words)
+    assert len(made) == 1
+    return made[0]
+
+
+def run(program, *words, **options):
+    """Runs a program of this folder as a user does."""
+    module = {"image2vdb": "esvr.images.image2vdb", "vdb2image": "esvr.images.vdb2image"}[program]
+    path = os.pathsep.join([str(pathlib.Path(esvr.__file__).parent.parent)] + sys.path)
+    return subprocess.run([sys.executable, "-m", module, *map(str, words)], capture_output=True, text=True, timeout=60,
+                          env={**os.environ, "PYTHONPATH": path}, **options)
+
+
+def to_image(source, out, *words):
+    """vdb2image in this process, without the child."""
+    arguments = vdb2image.PROGRAM.parse([str(source), str(out), *words])
+
+    class Log(Quiet):
+        texts = []
+
+        def warning(self, text):
+            self.texts.append(text)
+    log = Log()
+    log.texts = []
+    grid = esvr.PackedGrid.from_file(str(source), arguments.grid)
+    name, write = next(found for endings, found in vdb2image.FORMATS.items() if str(out).lower().endswith(endings))
+    write(str(out), vdb2image.Volume(grid, out, name, arguments, log))
+    return log.texts
+
+
+def dicom(folder, values, *, matrix=None, tool=None, change=None, names=None):
+    """Writes a series by pydicom, a file for each slice, and turns it by a program of dcmtk."""
+    pydicom = pytest.importorskip("pydicom")
+    from pydicom.dataset import Dataset, FileMetaDataset
+    matrix = LPS_TO_RAS @ (tilted() if matrix is None else matrix)
+    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
+    series = pydicom.uid.generate_uid()
+    folder.mkdir(exist_ok=True)
+    for k, page in enumerate(values):
+        data = Dataset()
+        data.file_meta = FileMetaDataset()
+        data.file_meta.TransferSyntaxUID = pydicom.uid.ExplicitVRLittleEndian
+        data.SOPClassUID, data.SOPInstanceUID = pydicom.uid.CTImageStorage, pydicom.uid.generate_uid()
+        data.file_meta.MediaStorageSOPClassUID, data.file_meta.MediaStorageSOPInstanceUID = data.SOPClassUID, data.SOPInstanceUID
+        data.SeriesInstanceUID, data.SeriesNumber, data.InstanceNumber, data.Modality = series, 3, k + 1, "CT"
+        data.PatientName, data.PatientID, data.StudyInstanceUID = "Test", "1", series
+        data.Rows, data.Columns = page.shape[:2]
+        data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
+        data.BitsAllocated = data.BitsStored = page.itemsize * 8
+        data.HighBit, data.PixelRepresentation = data.BitsStored - 1, int(page.dtype.kind == "i")
+        data.ImageOrientationPatient = [f"{n:.9f}" for n in [*(matrix[:3, 0] / spacing[0]), *(matrix[:3, 1] / spacing[1])]]
+        data.ImagePositionPatient = [f"{n:.8f}" for n in (matrix @ [0, 0, k, 1])[:3]]
+        data.PixelSpacing = [f"{spacing[1]:.6f}", f"{spacing[0]:.6f}"]
+        data.RescaleSlope, data.RescaleIntercept = 1, 0
+        data.PixelData = page.tobytes()
+        data.is_little_endian, data.is_implicit_VR = True, False
+        if change:
+            change(k, data)
+        name = folder / (names[k] if names else f"s{k}.dcm")
+        pydicom.dcmwrite(name, data, write_like_original=False)
+        if tool:
+            if not shutil.which(tool[0]):
+                pytest.skip(f"{tool[0]} is missing (Debian: dcmtk)")
+            subprocess.run([*tool, str(name), str(name) + ".new"], check=True, capture_output=True)
+            (folder / (name.name + ".new")).replace(name)
+    return folder
+
+
+def run_here(module, *words):
+    """Runs a program in this process (and the child that it starts), which is faster. Returns the exit code."""
+    before = sys.argv
+    sys.argv = ["program", *map(str, words)]
+    try:
+        return module.main()
+    finally:
+        sys.argv = before

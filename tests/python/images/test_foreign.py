@@ -1,0 +1,485 @@
+"""Files that other tools write are read as these tools, or a second one, read them."""
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import pytest
+
+from esvr.images import image2vdb, vdb2image
+from esvr.images.image import LPS_TO_RAS
+
+from conversions import convert, convert_all, dicom, ramp, run_here, tilted
+
+def same(made, values, matrix=None, atol=1e-5):
+    assert made.values.shape == values.shape
+    assert np.array_equal(made.values, values.astype(made.values.dtype))
+    if matrix is not None:
+        assert np.allclose(made.matrix, matrix, atol=atol)
+
+
+# -- NIfTI and Analyze by nibabel --------------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", ["u1", "i1", "i2", "u2", "f4", "f8", "i4"])
+@pytest.mark.parametrize("name", ["a.nii", "a.nii.gz", "a.img"])
+def test_nifti_by_nibabel(tmp_path, kind, name):
+    nibabel = pytest.importorskip("nibabel")
+    values = ramp(kind if kind not in ("u1", "i1") else "u2") % (100 if kind in ("u1", "i1") else 5000)
+    pair = nibabel.Nifti1Pair if name.endswith("img") else nibabel.Nifti1Image
+    nibabel.save(pair(values.astype(kind).transpose(2, 1, 0), tilted()), tmp_path / name)
+    again = nibabel.load(tmp_path / name)
+    made = convert(tmp_path / name)
+    same(made, np.asarray(again.dataobj).transpose(2, 1, 0), again.affine)
+    assert made.unit == "mm"
+
+
+def test_nifti2_big_endian_in_microns_by_nibabel(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    header = nibabel.Nifti2Header(endianness=">")
+    header.set_data_dtype(">i2")
+    image = nibabel.Nifti2Image(ramp("i2").transpose(2, 1, 0), tilted(), header=header)
+    image.header.set_xyzt_units("micron", "sec")
+    image.to_filename(tmp_path / "a.nii")
+    same(convert(tmp_path / "a.nii", "--unit", "um"), ramp(), tilted())
+
+
+@pytest.mark.parametrize("is_left_handed", [False, True])
+def test_qform_alone_by_nibabel(tmp_path, is_left_handed):
+    nibabel = pytest.importorskip("nibabel")
+    matrix = tilted() @ (np.diag([-1.0, 1, 1, 1]) if is_left_handed else np.eye(4))
+    image = nibabel.Nifti1Image(ramp("i2").transpose(2, 1, 0), None)
+    image.header.set_qform(matrix, 1)
+    image.header.set_sform(None, 0)
+    nibabel.save(image, tmp_path / "a.nii")
+    made = convert(tmp_path / "a.nii")
+    same(made, ramp(), nibabel.load(tmp_path / "a.nii").affine)
+    assert (np.linalg.det(made.matrix) < 0) == is_left_handed
+
+
+def test_analyze_by_nibabel(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    image = nibabel.AnalyzeImage(ramp("i2").transpose(2, 1, 0), np.diag([0.5, 0.75, 2, 1]))
+    nibabel.save(image, tmp_path / "a.img")
+    made = convert(tmp_path / "a.hdr")
+    same(made, ramp())
+    assert np.allclose(made.spacing, [0.5, 0.75, 2])
+
+
+def test_times_by_nibabel(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    values = np.stack([ramp("i2") + 1000 * t for t in range(3)])
+    nibabel.save(nibabel.Nifti1Image(values.transpose(3, 2, 1, 0), tilted()), tmp_path / "a.nii.gz")
+    same(convert(tmp_path / "a.nii.gz", "--time", 2), values[2], tilted())
+    same(convert(tmp_path / "a.nii.gz", "--time", 1), values[1])
+    assert [made.values[0, 0, 0] for made in convert_all(tmp_path / "a.nii.gz", "--time", "all")] == [1, 1001, 2001]
+
+
+# -- NRRD by teem ------------------------------------------------------------------------------------------------------
+def unu(*words, **options):
+    if not shutil.which("teem-unu"):
+        pytest.skip("teem-unu is missing (Debian: teem-apps)")
+    subprocess.run(["teem-unu", *map(str, words)], check=True, **options)
+
+
+def raw_nrrd(tmp_path, kind="u2"):
+    ramp(kind).tofile(tmp_path / "a.raw")
+    name = {"u2": "ushort", "f4": "float", "i4": "int", "u1": "uchar"}[kind]
+    unu("make", "-i", tmp_path / "a.raw", "-t", name, "-s", 6, 5, 4, "-sp", 0.5, 0.75, 2, "-e", "raw", "-en", "little", "-o",
+        tmp_path / "made.nrrd")
+    return tmp_path / "made.nrrd"
+
+
+@pytest.mark.parametrize("encoding", ["raw", "gzip", "bzip2", "ascii", "hex"])
+@pytest.mark.parametrize("kind", ["u2", "f4", "i4"])
+def test_encodings_by_teem(tmp_path, encoding, kind):
+    source = raw_nrrd(tmp_path, kind)
+    unu("save", "-i", source, "-f", "nrrd", "-e", encoding, "-o", tmp_path / "b.nrrd")
+    made = convert(tmp_path / "b.nrrd")
+    same(made, ramp())
+    assert np.allclose(made.spacing, [0.5, 0.75, 2])
+
+
+@pytest.mark.parametrize("encoding", ["raw", "gzip", "ascii"])
+def test_detached_headers_by_teem(tmp_path, encoding):
+    unu("save", "-i", raw_nrrd(tmp_path), "-f", "nrrd", "-e", encoding, "-o", tmp_path / "b.nhdr")
+    same(convert(tmp_path / "b.nhdr"), ramp())
+
+
+def test_slices_in_files_by_teem(tmp_path):
+    source = raw_nrrd(tmp_path)
+    unu("dice", "-i", source, "-a", 2, "-o", tmp_path / "s", "-ff", "%02d.nrrd")
+    for k in range(4):
+        unu("save", "-i", tmp_path / f"s{k:02d}.nrrd", "-f", "nrrd", "-e", "raw", "-o", tmp_path / f"s{k}.nhdr")
+    (tmp_path / "b.nhdr").write_text("NRRD0004\ntype: ushort\ndimension: 3\nsizes: 6 5 4\nendian: little\nencoding: raw\n"
+                                     "data file: s%d.raw 0 3 1\n")
+    same(convert(tmp_path / "b.nhdr"), ramp())
+    unu("save", "-i", tmp_path / "b.nhdr", "-f", "nrrd", "-e", "raw", "-o", tmp_path / "c.nrrd")
+    same(convert(tmp_path / "c.nrrd"), ramp())
+
+
+def test_axes_in_any_order_by_teem(tmp_path):
+    unu("permute", "-i", raw_nrrd(tmp_path), "-p", 2, 0, 1, "-o", tmp_path / "b.nrrd")
+    made = convert(tmp_path / "b.nrrd")
+    assert np.array_equal(made.values, ramp().transpose(1, 2, 0))
+    assert np.allclose(made.spacing, [2, 0.5, 0.75])
+
+
+def test_mins_by_teem(tmp_path):
+    unu("axinfo", "-i", raw_nrrd(tmp_path), "-a", 0, "-mm", -6, -3.5, "-c", "node", "-o", tmp_path / "b.nrrd")
+    made = convert(tmp_path / "b.nrrd")
+    assert np.allclose(made.matrix[:3, 3], [-6, 0, 0]) and np.allclose(made.spacing, [0.5, 0.75, 2])
+
+
+# -- MetaImage by ITK --------------------------------------------------------------------------------------------------
+def test_metaimage_by_hand_as_itk_reads_it(tmp_path):
+    # ITK: the rows of TransformMatrix are the directions of the axes, in LPS.
+    matrix = LPS_TO_RAS @ tilted()
+    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
+    rows = " ".join(f"{n:.17g}" for n in (matrix[:3, :3] / spacing).T.ravel())
+    (tmp_path / "a.mhd").write_text(
+        f"ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = True\nTransformMatrix = {rows}\n"
+        f"Offset = {' '.join(f'{n:.17g}' for n in matrix[:3, 3])}\nElementSpacing = {' '.join(map(str, spacing))}\n"
+        "DimSize = 6 5 4\nElementType = MET_USHORT\nElementDataFile = a.raw\n")
+    ramp(">u2").tofile(tmp_path / "a.raw")
+    same(convert(tmp_path / "a.mhd"), ramp(), tilted())
+
+
+# -- MRC by mrcfile ----------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", ["i1", "i2", "u2", "f4", "f2"])
+@pytest.mark.parametrize("compression", [None, "gzip"])
+def test_mrc_by_mrcfile(tmp_path, kind, compression):
+    mrcfile = pytest.importorskip("mrcfile")
+    values = (ramp() % 100 - 50).astype(kind) if kind == "i1" else ramp(kind)
+    with mrcfile.new(tmp_path / "a.mrc", compression=compression) as file:
+        file.set_data(values)
+        file.voxel_size = (1.5, 2.5, 4.0)
+        file.header.origin = (10, 20, 30)
+    made = convert(tmp_path / "a.mrc", "--unit", "angstrom")
+    same(made, values, [[1.5, 0, 0, 10], [0, 2.5, 0, 20], [0, 0, 4, 30], [0, 0, 0, 1]])
+    assert made.unit == "angstrom"
+
+
+def test_mrc_axes_and_starts_by_mrcfile(tmp_path):
+    mrcfile = pytest.importorskip("mrcfile")
+    with mrcfile.new(tmp_path / "a.map") as file:
+        file.set_data(ramp("f4"))
+        file.header.mapc, file.header.mapr, file.header.maps = 3, 2, 1
+        file.header.mx, file.header.my, file.header.mz = 4, 5, 6
+        file.header.cella = (4 * 2.0, 5 * 0.75, 6 * 0.5)
+        file.header.nxstart, file.header.nystart, file.header.nzstart = 5, 6, 7
+    made = convert(tmp_path / "a.map", "--unit", "angstrom")
+    assert np.array_equal(made.values, ramp().transpose(2, 1, 0))
+    assert np.allclose(made.spacing, [2, 0.75, 0.5])
+    assert np.allclose(made.matrix[:3, 3], [7 * 2.0, 6 * 0.75, 5 * 0.5])
+
+
+# -- TIFF by tifffile, GDAL and Pillow -----------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"])
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_types_by_tifffile(tmp_path, kind, order):
+    tifffile = pytest.importorskip("tifffile")
+    values = (ramp() % 100).astype(kind) if kind in ("u1", "i1") else ramp(kind)
+    tifffile.imwrite(tmp_path / "a.tif", values, byteorder=order, metadata={"axes": "ZYX"}, photometric="minisblack")
+    same(convert(tmp_path / "a.tif"), values)
+
+
+@pytest.mark.parametrize("options", [dict(tile=(16, 16)), dict(compression="zlib", predictor=True), dict(bigtiff=True),
+                                     dict(rowsperstrip=2), dict(compression="zlib", tile=(32, 16))])
+def test_layouts_by_tifffile(tmp_path, options):
+    tifffile = pytest.importorskip("tifffile")
+    values = ramp("u2", (40, 35, 3))
+    try:
+        tifffile.imwrite(tmp_path / "a.tif", values, metadata={"axes": "ZYX"}, photometric="minisblack", **options)
+    except ValueError as missing:
+        pytest.skip(str(missing))
+    same(convert(tmp_path / "a.tif"), values)
+
+
+def test_imagej_hyperstack_by_tifffile(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    values = np.stack([np.stack([ramp() + 1000 * c + 4000 * t for c in range(2)], axis=1) for t in range(3)])
+    tifffile.imwrite(tmp_path / "a.tif", values, imagej=True, resolution=(2.0, 4.0),
+                     metadata={"axes": "TZCYX", "spacing": 3.0, "unit": "um"})
+    made = convert(tmp_path / "a.tif", "--channel", 1, "--time", 2, "--unit", "um")
+    same(made, values[2, :, 1])
+    assert np.allclose(made.spacing, [0.5, 0.25, 3])
+
+
+def test_one_page_for_all_slices_by_tifffile(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    tifffile.imwrite(tmp_path / "a.tif", ramp(), imagej=True, metadata={"axes": "ZYX"}, contiguous=True)
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        second = file.pages[0].tags["ImageWidth"].offset - 2 + 2 + 12 * len(file.pages[0].tags)
+    data = bytearray((tmp_path / "a.tif").read_bytes())
+    data[second:second + 4] = bytes(4)  # ImageJ writes no directory for the other slices of a large file
+    (tmp_path / "a.tif").write_bytes(data)
+    same(convert(tmp_path / "a.tif"), ramp())
+
+
+@pytest.mark.parametrize("axes", ["CZYX", "ZCYX", "TCZYX"])
+def test_ome_by_tifffile(tmp_path, axes):
+    tifffile = pytest.importorskip("tifffile")
+    planes = {"c": 2, "z": 4, "t": 2}
+    shape = [planes[a.lower()] for a in axes[:-2]] + [5, 6]
+    values = np.arange(np.prod(shape), dtype="u2").reshape(shape) + 1
+    tifffile.imwrite(tmp_path / "a.ome.tif", values, ome=True, photometric="minisblack", metadata={
+        "axes": axes, "PhysicalSizeX": 200, "PhysicalSizeXUnit": "nm", "PhysicalSizeY": 0.25, "PhysicalSizeYUnit": "µm",
+        "PhysicalSizeZ": 0.001, "PhysicalSizeZUnit": "mm", "Channel": {"Name": ["DAPI", "GFP"]}})
+    words = ["--time", 1] if "T" in axes else []
+    made = convert(tmp_path / "a.ome.tif", "--channel", 1, "--unit", "um", *words)
+    expected = values[1] if "T" in axes else values
+    same(made, expected[:, 1] if axes == "ZCYX" else expected[1])
+    assert np.allclose(made.spacing, [0.2, 0.25, 1.0])
+    grids = convert_all(tmp_path / "a.ome.tif", "--channel", "all", *words)
+    assert [made.grid.name for made in grids] == ["DAPI", "GFP"]
+
+
+@pytest.mark.parametrize("options", [["COMPRESS=LZW"], ["COMPRESS=LZW", "PREDICTOR=2"], ["COMPRESS=DEFLATE", "TILED=YES"],
+                                     ["COMPRESS=ZSTD"], ["COMPRESS=LZMA"], ["COMPRESS=PACKBITS"], ["NBITS=12"],
+                                     ["NBITS=10", "COMPRESS=LZW"], ["SPARSE_OK=TRUE"], ["ENDIANNESS=BIG", "COMPRESS=LZW"]])
+def test_codes_by_gdal(tmp_path, options):
+    pytest.importorskip("tifffile")
+    gdal = pytest.importorskip("osgeo.gdal")
+    values = ramp("u2")[0:1] % 1000
+    data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16, options)
+    data.GetRasterBand(1).WriteArray(values[0])
+    data = None
+    same(convert(tmp_path / "a.tif"), gdal.Open(str(tmp_path / "a.tif")).ReadAsArray()[np.newaxis])
+    same(convert(tmp_path / "a.tif"), values)
+
+
+def test_float_predictor_missing_and_scale_by_gdal(tmp_path):
+    pytest.importorskip("tifffile")
+    gdal = pytest.importorskip("osgeo.gdal")
+    values = ramp("f4")[0] / 4
+    values[0, 0] = -9999
+    data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_Float32, ["COMPRESS=LZW", "PREDICTOR=3"])
+    band = data.GetRasterBand(1)
+    band.WriteArray(values)
+    band.SetNoDataValue(-9999)
+    band.SetScale(2.0)
+    band.SetOffset(10.0)
+    data = band = None
+    made = convert(tmp_path / "a.tif")
+    assert made.missing == 1 and not made.active[0, 0, 0] and made.active.sum() == 29
+    assert np.array_equal(made.values[0][made.active[0]], (values * 2 + 10)[made.active[0]])
+
+
+def test_pages_by_pillow(tmp_path):
+    pytest.importorskip("tifffile")
+    pil = pytest.importorskip("PIL.Image")
+    pages = [pil.fromarray(page) for page in ramp("u2")]
+    pages[0].save(tmp_path / "a.tif", save_all=True, append_images=pages[1:], compression="tiff_lzw")
+    pytest.importorskip("osgeo.gdal")
+    same(convert(tmp_path / "a.tif"), ramp())
+
+
+# -- VTI by VTK ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("mode", ["ascii", "binary", "appended"])
+@pytest.mark.parametrize("compressor", ["none", "zlib", "lz4", "lzma"])
+def test_vti_by_vtk(tmp_path, mode, compressor):
+    xml = pytest.importorskip("vtkmodules.vtkIOXML")
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    matrix = tilted()
+    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
+    image = vtkImageData()
+    image.SetDimensions(6, 5, 4)
+    image.SetSpacing(spacing)
+    image.SetOrigin(matrix[:3, 3])
+    image.SetDirectionMatrix(*(matrix[:3, :3] / spacing).ravel())
+    array = numpy_to_vtk(ramp("f4").ravel(), deep=True)
+    array.SetName("T")
+    image.GetPointData().AddArray(array)  # no array is named as active
+    writer = xml.vtkXMLImageDataWriter()
+    writer.SetFileName(str(tmp_path / "a.vti"))
+    writer.SetInputData(image)
+    getattr(writer, {"ascii": "SetDataModeToAscii", "binary": "SetDataModeToBinary", "appended": "SetDataModeToAppended"}[mode])()
+    writer.SetCompressorType({"none": 0, "zlib": 1, "lz4": 2, "lzma": 3}[compressor])
+    writer.Write()
+    same(convert(tmp_path / "a.vti"), ramp(), matrix)
+
+
+# -- HDF5 and netCDF -----------------------------------------------------------------------------------------------------
+def test_hdf5_by_h5py(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        chunked = file.create_dataset("volumes/raw", data=ramp(">u2"), chunks=(2, 3, 3), compression="gzip", shuffle=True)
+        chunked.attrs["element_size_um"] = [2.0, 0.75, 0.5]
+    made = convert(tmp_path / "a.h5", "--unit", "um")
+    same(made, ramp(), np.diag([0.5, 0.75, 2, 1]))
+
+
+@pytest.mark.parametrize("kind", ["f2", "f4", "f8", "i8", "u8", "bool"])
+def test_hdf5_types_by_h5py(tmp_path, kind):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["a"] = (ramp() > 200) if kind == "bool" else ramp(kind)
+    made = convert(tmp_path / "a.h5")
+    assert made.grid.value_type == {"bool": "bool", "i8": "int64", "u8": "int64"}.get(kind, "float")
+    same(made, (ramp() > 200) if kind == "bool" else ramp(kind))
+
+
+def test_hdf5_scales_by_h5py(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["t"] = np.stack([ramp(), ramp() + 1000])
+        for k, (name, size, step) in enumerate([("time", 2, 1.0), ("z", 4, 2.0), ("y", 5, 0.75), ("x", 6, 0.5)]):
+            file[name] = 10 + step * np.arange(size)
+            file[name].make_scale(name)
+            if name != "time":
+                file[name].attrs["units"] = "mm"
+            file["t"].dims[k].attach_scale(file[name])
+    made = convert(tmp_path / "a.h5", "--time", 1)
+    same(made, ramp() + 1000, [[0.5, 0, 0, 10], [0, 0.75, 0, 10], [0, 0, 2, 10], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize("form", ["NETCDF4", "NETCDF4_CLASSIC", "NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT_DATA"])
+def test_netcdf_by_netcdf4(tmp_path, form):
+    netcdf = pytest.importorskip("netCDF4")
+    with netcdf.Dataset(tmp_path / "a.nc", "w", format=form) as file:
+        for name, size in (("level", 4), ("lat", 5), ("lon", 6)):
+            file.createDimension(name, None if name == "level" else size)
+            file.createVariable(name, "f4", (name,))[:] = np.arange(size) * 0.25 + 3
+        t = file.createVariable("t", "i2", ("level", "lat", "lon"), fill_value=-32767)
+        t.scale_factor, t.add_offset, t.units = 0.01, 273.15, "K"
+        t[:] = np.ma.MaskedArray(250 + ramp() / 10.0, ramp() == 1)
+    made = convert(tmp_path / "a.nc")
+    with netcdf.Dataset(tmp_path / "a.nc") as file:
+        again = file["t"][:]
+    assert made.missing == 1 and np.array_equal(~made.active, np.ma.getmaskarray(again))
+    assert np.allclose(made.values[made.active], again.compressed(), rtol=1e-6)
+    assert made.grid.metadata["value_unit"] == "K"
+
+
+def test_netcdf_by_xarray(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    data = xarray.Dataset({"t": (("time", "z", "y", "x"), np.stack([ramp("f4"), ramp("f4") + 1000]))}, coords={
+        "time": np.array(["2020-01-01", "2020-01-02"], "M8[ns]"), "z": ("z", np.arange(4) * 100.0, {"units": "m"}),
+        "y": ("y", 5000.0 - np.arange(5) * 1000, {"units": "m"}), "x": ("x", np.arange(6.0) * 2, {"units": "km"})})
+    data["t"][0, 0, 0, 0] = np.nan
+    data.to_netcdf(tmp_path / "a.nc", engine="netcdf4", encoding={"t": {"_FillValue": np.float32(np.nan)}})
+    made = convert(tmp_path / "a.nc", "--time", 0, "--unit", "m")
+    assert made.missing == 1
+    assert np.array_equal(made.values[made.active], ramp()[made.active])
+    assert np.allclose(made.matrix, [[2000, 0, 0, 0], [0, -1000, 0, 5000], [0, 0, 100, 0], [0, 0, 0, 1]])
+
+
+# -- Zarr ----------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("separator", [".", "/"])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_zarr_by_zarr(tmp_path, separator, order):
+    zarr = pytest.importorskip("zarr")
+    array = zarr.open(str(tmp_path / "a.zarr"), mode="w", shape=(4, 5, 6), chunks=(3, 2, 4), dtype=">u2", order=order,
+                      dimension_separator=separator)
+    array[:] = ramp()
+    same(convert(tmp_path / "a.zarr"), ramp())
+
+
+def test_zarr_by_xarray(tmp_path):
+    pytest.importorskip("zarr")
+    xarray = pytest.importorskip("xarray")
+    data = xarray.Dataset({"t": (("z", "y", "x"), ramp("f4"))}, coords={"x": ("x", np.arange(6) * 0.5, {"units": "mm"}), "y": (
+        "y", np.arange(5) * 0.75, {"units": "mm"}), "z": ("z", np.arange(4) * 2.0, {"units": "mm"})})
+    data.to_zarr(tmp_path / "a.zarr")
+    same(convert(tmp_path / "a.zarr"), ramp(), np.diag([0.5, 0.75, 2, 1]))
+
+
+def test_zarr_zip_by_zarr(tmp_path):
+    zarr = pytest.importorskip("zarr")
+    with zarr.ZipStore(str(tmp_path / "a.zarr.zip"), mode="w") as store:
+        zarr.create(shape=(4, 5, 6), chunks=(2, 5, 6), dtype="u2", store=store)[:] = ramp()
+    same(convert(tmp_path / "a.zarr.zip"), ramp())
+
+
+# -- DICOM by pydicom and dcmtk --------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("tool", [None, ("dcmcrle",), ("dcmcjpls",), ("dcmcjpeg", "+e1"), ("dcmconv", "+tb"), ("dcmconv", "+td"),
+                                  ("dcmconv", "+ti")])
+@pytest.mark.parametrize("kind", ["u2", "i2"])
+def test_dicom_by_pydicom_and_dcmtk(tmp_path, tool, kind):
+    folder = dicom(tmp_path / "s", ramp(kind) - (300 if kind == "i2" else 0), tool=tool)
+    made = convert(folder)
+    same(made, ramp("i4") - (300 if kind == "i2" else 0), tilted(), atol=1e-4)
+
+
+# -- ITK and ImageJ ------------------------------------------------------------------------------------------------------
+def itk(*words):
+    """ITK as WebAssembly: npm install @itk-wasm/image-io@1.6.1; ESVR_ITK_WASM is then the folder node_modules."""
+    folder = os.environ.get("ESVR_ITK_WASM", "")
+    if not folder or not shutil.which("node"):
+        pytest.skip("ESVR_ITK_WASM is not set (npm install @itk-wasm/image-io)")
+    script = pathlib.Path(__file__).with_name("itk.mjs")
+    return json.loads(subprocess.run(["node", str(script), folder, *map(str, words)], check=True, capture_output=True).stdout)
+
+
+def test_itk_writes_and_reads(tmp_path):
+    files = [tmp_path / f"a.{ending}" for ending in ("mha", "nii.gz", "nrrd")]
+    itk("write", *files)
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]]) * [0.5, 0.75, 2]
+    matrix[:3, 3] = 6, -100, 7
+    backs = []
+    for file in files:
+        same(convert(file), ramp(), LPS_TO_RAS @ matrix)
+        backs.append(tmp_path / f"back.{file.name.partition('.')[2]}")
+        assert run_here(image2vdb, file, tmp_path / "a.vdb", "-f") == 0 and run_here(vdb2image, tmp_path / "a.vdb", backs[-1]) == 0
+    for seen in itk("read", *backs):
+        assert seen["type"] == "int16" and seen["size"] == [6, 5, 4] and np.array_equal(seen["data"], ramp().ravel())
+        assert np.allclose(np.array(seen["direction"]).reshape(3, 3) * seen["spacing"], matrix[:3, :3], atol=1e-5)
+        assert np.allclose(seen["origin"], matrix[:3, 3], atol=1e-4)
+
+
+def imagej(tmp_path, macro, screen=()):
+    jar = pathlib.Path("/usr/share/java/ij.jar")
+    if not jar.exists() or not shutil.which("java"):
+        pytest.skip("ImageJ is missing (Debian: imagej)")
+    (tmp_path / "m.ijm").write_text(macro)
+    headless = [] if screen else ["-Djava.awt.headless=true"]
+    subprocess.run([*screen, "java", *headless, "-cp", str(jar), "ij.ImageJ", "-batch", str(tmp_path / "m.ijm")],
+                   capture_output=True, check=True, timeout=60)
+
+
+def test_imagej_writes_and_reads(tmp_path):
+    pytest.importorskip("tifffile")
+    # Voxel (x, y) of slice n (from 1 on) of the hyperstack of 2 channels and 4 slices.
+    imagej(tmp_path, f"""
+newImage("a", "16-bit black", 6, 5, 8);
+for (n = 1; n <= 8; n++) {{ setSlice(n); for (y = 0; y < 5; y++) for (x = 0; x < 6; x++) setPixel(x, y, 1000 * n + 10 * y + x); }}
+setVoxelSize(0.5, 0.25, 2, "micron");
+Stack.setDimensions(2, 4, 1);
+saveAs("Tiff", "{tmp_path}/hyper.tif");
+newImage("b", "32-bit ramp", 6, 5, 4);
+saveAs("Tiff", "{tmp_path}/float.tif");
+""")
+    made = convert(tmp_path / "hyper.tif", "--channel", 1, "--unit", "um")
+    z, y, x = np.mgrid[0:4, 0:5, 0:6]
+    assert np.array_equal(made.values, 1000 * (2 * z + 2) + 10 * y + x) and np.allclose(made.spacing, [0.5, 0.25, 2])
+    assert np.allclose(convert(tmp_path / "float.tif").values, x / 6, atol=1e-6)
+    assert run_here(image2vdb, tmp_path / "hyper.tif", tmp_path / "a.vdb", "--channel", 1) == 0
+    assert run_here(vdb2image, tmp_path / "a.vdb", tmp_path / "back.tif") == 0
+    if not shutil.which("xvfb-run"):
+        pytest.skip("ImageJ opens files on a screen only (Debian: xvfb)")
+    imagej(tmp_path, f"""
+open("{tmp_path}/back.tif");
+getVoxelSize(w, h, d, unit); getDimensions(x, y, c, z, t); setSlice(3);
+File.saveString("" + w + " " + h + " " + d + " " + unit + " " + x + " " + y + " " + c + " " + z + " " + t + " " + getPixel(4, 2),
+                "{tmp_path}/said.txt");
+""", ["xvfb-run", "-a"])
+    said = (tmp_path / "said.txt").read_text().split()
+    assert np.allclose([float(n) for n in said[:3]], [0.5, 0.25, 2]) and said[3:] == ["microns", "6", "5", "1", "4", "1", "6024"]
+
+
+# -- raw numbers ---------------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("endian", ["little", "big"])
+def test_raw_by_struct(tmp_path, endian):
+    header = b"header"
+    (tmp_path / "a.raw").write_bytes(header + struct.pack(f"{'<' if endian == 'little' else '>'}120H", *ramp().ravel()))
+    same(convert(tmp_path / "a.raw", "--dims", "6,5,4", "--type", "uint16", "--endian", endian, "--skip", len(header)), ramp())
+
+
+@pytest.mark.parametrize("is_fortran", [False, True])
+def test_npy_by_numpy(tmp_path, is_fortran):
+    np.save(tmp_path / "a.npy", np.asfortranarray(ramp()) if is_fortran else ramp())
+    same(convert(tmp_path / "a.npy"), ramp())
