@@ -17,10 +17,10 @@ namespace {
 
 constexpr Coord kSize{11, 9, 17};
 
-std::size_t count() { return std::size_t(kSize.x) * kSize.y * kSize.z; }
+std::size_t voxelCount() { return std::size_t(kSize.x) * kSize.y * kSize.z; }
 
 template <class T>
-T expected(Coord v) {
+T expectedValue(Coord v) {
   return T((v.x + 3 * v.y + 7 * v.z) % 40);
 }
 
@@ -34,15 +34,15 @@ void forEachVoxel(const Visit& visit) {
 
 /// The voxels with the first of these axes fastest.
 template <class T>
-struct Image {
-  explicit Image(std::array<int, 3> order) : voxels(new T[count()]) {
+struct TestImage {
+  explicit TestImage(std::array<int, 3> order) : voxels(new T[voxelCount()]) {
     const std::array side{kSize.x, kSize.y, kSize.z};
     std::ptrdiff_t step = 1;
     for (const int axis : order) {
       strides[std::size_t(axis)] = step;
       step *= side[std::size_t(axis)];
     }
-    forEachVoxel([&](Coord v) { at(v) = expected<T>(v); });
+    forEachVoxel([&](Coord v) { at(v) = expectedValue<T>(v); });
   }
   T& at(Coord v) { return voxels[strides[0] * v.x + strides[1] * v.y + strides[2] * v.z]; }
   [[nodiscard]] ImageBox<T> box() const { return {voxels.get(), strides, {}, kSize}; }
@@ -74,7 +74,7 @@ void expectVoxels(const PackedVoxels<T>& voxels, const IsActive& isActive) {
   const auto all = voxelsOf(voxels);
   std::size_t active = 0;
   forEachVoxel([&](Coord v) {
-    const auto value = expected<int>(v);
+    const auto value = expectedValue<int>(v);
     const auto at = all.find(v);
     ASSERT_EQ(at != all.end(), isActive(value)) << toString(v);
     if (at == all.end()) return;
@@ -87,15 +87,15 @@ void expectVoxels(const PackedVoxels<T>& voxels, const IsActive& isActive) {
 TEST(PackedGrid, hasTheVoxelsOfAnImageInAnyOrderOfItsAxes) {
   for (const std::array<int, 3> order :
        {std::array{0, 1, 2}, std::array{2, 1, 0}, std::array{1, 2, 0}}) {
-    expectVoxels(packedOf<float>(Image<std::uint8_t>(order).box(), 0.0f, {.threshold = 30.0}),
+    expectVoxels(packedOf<float>(TestImage<std::uint8_t>(order).box(), 0.0f, {.threshold = 30.0}),
                  [](int value) { return value >= 30; });
-    expectVoxels(packedOf<float>(Image<float>(order).box(), 5.0f, {}),
+    expectVoxels(packedOf<float>(TestImage<float>(order).box(), 5.0f, {}),
                  [](int value) { return value != 5; });
   }
 }
 
 TEST(PackedGrid, ordersBricksAndKeepsTheValuesOfSlabs) {
-  const Image<std::int16_t> image({0, 1, 2});
+  const TestImage<std::int16_t> image({0, 1, 2});
   GridPacker<float> packer(0.0f, {});
   for (const int z : {16, 0, 8}) {
     ImageBox<std::int16_t> slab = image.box();
@@ -110,17 +110,17 @@ TEST(PackedGrid, ordersBricksAndKeepsTheValuesOfSlabs) {
 }
 
 TEST(PackedGrid, comparesTheThresholdInTheTypeOfTheImage) {
-  const Image<std::uint8_t> image({0, 1, 2});
+  const TestImage<std::uint8_t> image({0, 1, 2});
   const auto activeFrom = [&](double threshold) {
     return voxelsOf(packedOf<float>(image.box(), 0.0f, {.threshold = threshold})).size();
   };
   EXPECT_EQ(activeFrom(29.5), activeFrom(30.0));
   EXPECT_GT(activeFrom(29.0), activeFrom(29.5));
-  EXPECT_EQ(activeFrom(-1.0), count());
-  EXPECT_EQ(activeFrom(-1e300), count());
+  EXPECT_EQ(activeFrom(-1.0), voxelCount());
+  EXPECT_EQ(activeFrom(-1e300), voxelCount());
   EXPECT_EQ(activeFrom(256.0), 0u);
   EXPECT_EQ(activeFrom(1e300), 0u);
-  EXPECT_EQ(voxelsOf(packedOf<float>(image.box(), 0.5f, {})).size(), count())
+  EXPECT_EQ(voxelsOf(packedOf<float>(image.box(), 0.5f, {})).size(), voxelCount())
       << "no whole number equals the background";
 }
 
@@ -183,7 +183,7 @@ TEST(PackedGrid, takesTheActiveVoxelsThatAreGivenAndVectors) {
 }
 
 TEST(PackedGrid, refusesBoxesThatOverlapOrBeginWithinABrickAndTooMuchMemory) {
-  const Image<float> image({0, 1, 2});
+  const TestImage<float> image({0, 1, 2});
   ImageBox<float> box = image.box();
   GridPacker<float> packer(0.0f, {});
   packer.add<float>(std::span(&box, 1));
@@ -195,10 +195,10 @@ TEST(PackedGrid, refusesBoxesThatOverlapOrBeginWithinABrickAndTooMuchMemory) {
 }
 
 TEST(PackedGrid, becomesAVolumeAndComesBack) {
-  const Image<float> image({0, 1, 2});
+  const TestImage<float> image({0, 1, 2});
   const auto voxels = packedOf<float>(image.box(), 5.0f, {});
   const SparseVolume volume = unpacked(voxels);
-  forEachVoxel([&](Coord v) { ASSERT_EQ(valueAt(volume, v), expected<float>(v)); });
+  forEachVoxel([&](Coord v) { ASSERT_EQ(valueAt(volume, v), expectedValue<float>(v)); });
   GridDescriptor descriptor;
   descriptor.name = "a";
   const PackedGrid grid = packed(descriptor, volume);

@@ -44,7 +44,7 @@ MetaItem itemOf(const std::string& name, const char* type, const T& value) {
   return item;
 }
 
-bool isWhole(const py::handle& value) { return PyIndex_Check(value.ptr()) != 0; }
+bool isInteger(const py::handle& value) { return PyIndex_Check(value.ptr()) != 0; }
 bool isFloat(const py::handle& value) { return py::isinstance<py::float_>(value); }
 
 /// True for a tuple of three objects of a kind.
@@ -63,13 +63,13 @@ std::vector<MetaItem> itemsOf(const py::dict& metadata) {
     const auto name = key.cast<std::string>();
     if (py::isinstance<py::bool_>(value))
       items.push_back(itemOf(name, "bool", value.cast<bool>()));
-    else if (isWhole(value))
+    else if (isInteger(value))
       items.push_back(itemOf(name, "int64", value.cast<std::int64_t>()));
     else if (py::isinstance<py::float_>(value))
       items.push_back(itemOf(name, "double", value.cast<double>()));
     else if (py::isinstance<py::str>(value))
       items.push_back(stringItem(name, value.cast<std::string>()));
-    else if (isTriple(value, isWhole))
+    else if (isTriple(value, isInteger))
       items.push_back(itemOf(name, "vec3i", value.cast<Corner>()));
     else if (isTriple(value, isFloat))
       items.push_back(itemOf(name, "vec3d", value.cast<std::array<double, 3>>()));
@@ -90,7 +90,7 @@ py::object valueAs(const MetaItem& item) {
 }
 
 /// None for an item of a type that itemsOf does not make and that is no number.
-py::object valueOf(const MetaItem& item) {
+py::object objectOf(const MetaItem& item) {
   const auto* const text = reinterpret_cast<const char*>(item.value.data());
   if (item.type == "string")
     return py::reinterpret_steal<py::object>(
@@ -109,7 +109,7 @@ py::object valueOf(const MetaItem& item) {
 py::dict dictOf(const std::vector<MetaItem>& items) {
   py::dict metadata;
   for (const MetaItem& item : items)
-    if (const py::object value = valueOf(item); !value.is_none())
+    if (const py::object value = objectOf(item); !value.is_none())
       metadata[py::str(item.name)] = value;
   return metadata;
 }
@@ -363,7 +363,7 @@ void fillSigned(const SignedVoxels& levelSet, BoxArray<float>& to) {
   });
 }
 
-Box boxOrActive(const PackedGrid& grid, const std::optional<PlainBox>& box) {
+Box chosenBox(const PackedGrid& grid, const std::optional<PlainBox>& box) {
   const Box chosen = box ? boxOf(*box) : activeBox(grid);
   if (chosen.empty())
     throw UsageError(box ? "the box is empty" : "the grid has no active voxel; name a box");
@@ -377,7 +377,7 @@ bool isXFastest(const std::string& order) {
 
 py::array packedToNumpy(const Packed& self, const std::optional<PlainBox>& box,
                         const std::string& order) {
-  const Box chosen = boxOrActive(*self.grid, box);
+  const Box chosen = chosenBox(*self.grid, box);
   return std::visit(
       [&]<class T>(const PackedVoxels<T>& voxels) {
         BoxArray<T> array(chosen, isXFastest(order));
@@ -394,7 +394,7 @@ py::array packedToNumpy(const Packed& self, const std::optional<PlainBox>& box,
 /// The active voxels of a box, which are the voxels of a mask.
 py::array activeOf(const Packed& self, const std::optional<PlainBox>& box,
                    const std::string& order) {
-  const Box chosen = boxOrActive(*self.grid, box);
+  const Box chosen = chosenBox(*self.grid, box);
   const auto bricks = bricksOf(*self.grid);
   BoxArray<bool> array(chosen, isXFastest(order));
   interruptible([&] {
@@ -464,7 +464,7 @@ Packed fromVdbFile(const std::filesystem::path& path, const GridChoice& choice,
   return {std::make_shared<const PackedGrid>(readPacked(path, grid.place, options))};
 }
 
-EsvrFile readFrame(const std::filesystem::path& path, const std::optional<int64_t>& frame,
+EsvrFile contentOf(const std::filesystem::path& path, const std::optional<int64_t>& frame,
                    std::uint64_t maxBytes) {
   const ReadLimits limits{.maxBytes = maxBytes};
   if (frame) return SequenceReader(path, limits).read(*frame);
@@ -475,7 +475,7 @@ EsvrFile readFrame(const std::filesystem::path& path, const std::optional<int64_
 
 Packed fromEsvrFile(const std::filesystem::path& path, const GridChoice& choice,
                     const std::optional<int64_t>& frame, const ReadOptions& options) {
-  const EsvrFile file = readFrame(path, frame, options.maxBytes);
+  const EsvrFile file = contentOf(path, frame, options.maxBytes);
   const NamedGrid named = choice.in(namesInOrder(file), path);
   const GridOfFile grid = gridsInOrder(file)[named.place];
   if (named.component && !grid.isVector)
@@ -531,7 +531,7 @@ std::vector<NameAndType> listGrids(const std::filesystem::path& path,
         all.emplace_back(grid.uniqueName, grid.valueType);
       return all;
     }
-    const EsvrFile file = readFrame(path, frame, usualMemoryLimit());
+    const EsvrFile file = contentOf(path, frame, usualMemoryLimit());
     const GridNames names(namesInOrder(file));
     for (const GridOfFile& grid : gridsInOrder(file))
       all.emplace_back(names.unique(all.size()), typeOf(file, grid));
