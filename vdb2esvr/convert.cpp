@@ -57,8 +57,6 @@ void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
   grid.conversion = convertVolume({source.descriptor, source.volume}, wanted);
 }
 
-}
-
 /// Largest number of voxels in bricks up to which the meshes of a level set are compared without
 /// being asked for. Comparing them takes about 2 s per million of these voxels.
 constexpr std::size_t kMaxMeshedVoxels = std::size_t{1} << 19;

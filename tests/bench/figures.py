@@ -122,9 +122,9 @@ def formats(bench):
                 words = [source[0], *([file] if file else []), *source[1:], *([] if file else ["--size", size])]
                 table = bench.report("esvr-compare", "table", *words, "--rows", "matched,zfp", "--max-dense", "1GB",
                                      "--runs", 1, *bench.rivals())
-                keys = ("bytes", "psnr_box", "psnr_active", "max_error", "iou", "encode_seconds", "decode_seconds")
+                keys = ("bytes", "psnr_box", "psnr_active", "max_error", "iou", "encode_s", "decode_s")
                 rows += [{"row": r["name"], **{k: r[k] for k in keys if k in r}} for r in table["rows"]
-                         if r.get("bytes", math.inf) <= 1.02 * size and "ESVR" not in r["name"]]
+                         if (r.get("bytes") or math.inf) <= 1.02 * size and r["group"] != "ESVR"]
                 return [{"volume": name, "part": f"1/{part}", "size": size, **r} for r in rows]
             yield (name, f"1/{part}"), measured
 
@@ -191,7 +191,7 @@ def resolution(bench):
                 table = bench.report("esvr-compare", "table", path, "--psnr-active", row["psnr_active"], "--rows",
                                      "matched,zfp", "--max-dense", "1GB", "--runs", 1, *bench.rivals())
                 rows = [{"row": "ESVR", **row}] + [{"row": r["name"], "bytes": r["bytes"], "psnr_active": r["psnr_active"]}
-                                                   for r in table["rows"] if "bytes" in r]
+                                                   for r in table["rows"] if r.get("bytes")]
                 return [{"skeleton": swc.stem, "resolution": side, **r} for r in rows]
             yield (name,), measured
 

@@ -268,7 +268,7 @@ def draw(panels, path):
         chart.tick_params(labelsize=7)
     named = {l: h for chart in axes.flat for h, l in zip(*chart.get_legend_handles_labels())}
     figure.legend(named.values(), named.keys(), loc="lower center", ncols=4, fontsize=7)
-    figure.supylabel("PSNR over the box, dB", fontsize=8)
+    figure.supylabel("PSNR over the box in dB, over seconds", fontsize=8)
     figure.tight_layout(rect=(0, 0.09, 1, 1))
     figure.savefig(path, metadata={"Date": None})
     pyplot.close(figure)

@@ -396,7 +396,7 @@ TEST(CompactLayout, WithPackedSectionsInPackedSectionsIsRefused) {
 TEST(CompactLayout, WithMoreRecordsThanStoredBytesIsRefused) {
   constexpr std::size_t kZeros = 1 << 16;  // records without bytes
   format::SectionWriter out;
-  out.add({SectionKind::kGridRecords}, format::kRequired, Bytes(kZeros), 1);
+  out.add({SectionKind::kGridRecords}, format::kRequired, Bytes(kZeros));
   EXPECT_THAT([&] { decode(out.assemble()); },
               ThrowsMessage<BadInput>(HasSubstr("more records than it has stored bytes")));
 }
