@@ -4,6 +4,7 @@
 #include <future>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "cli/interrupts.h"
@@ -229,14 +230,6 @@ EsvrFile carriedAndConverted(const Options& options, std::vector<CarriedGrid> ca
   return assemble(std::move(carried), record);
 }
 
-void store(const Options& options, const EsvrFile& file, const StoreFile& store,
-           RunRecord& record) {
-  cli::Stopwatch watch;
-  record.output = store(file);
-  record.secondsWrite = watch.lap();
-  if (!record.interrupted) measureVectors(options, file, record);
-}
-
 void tellResult(const Options& options, const RunRecord& record) {
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeReport(options, record));
@@ -343,8 +336,14 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   const bool isShared = file.layout == FileLayout::kCompact;
   if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
   watched.requireUnchanged();  // the grids were read one after the other
-  const Completion completion;
-  store(options, file, run.store, record);
+  // There is nothing of a lossless conversion to keep before it is complete.
+  std::optional<Completion> completion;
+  if (!std::holds_alternative<LosslessGoal>(options.convert.goal)) completion.emplace();
+  cli::Stopwatch writing;
+  record.output = run.store(file);
+  record.secondsWrite = writing.lap();
+  if (!completion) completion.emplace();  // the file is there, and so will be its report
+  if (!record.interrupted) measureVectors(options, file, record);
   if (isShared) record.bytesSeparate = bytesWithoutSharing(file, record);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();

@@ -12,7 +12,7 @@
 namespace esvr::convert {
 
 /// Largest number of trials of a search.
-inline constexpr int kMaxTrials = 10;
+inline constexpr int kMaxTrials = 14;
 
 /// Price of a bit (thriftyLayer). It is the best one at 40 to 60 dB on the volumes of
 /// docs/lab-notes.md, "Voxel coding": 0.05 gives files that are up to 1 % larger, 0.12 up to 5 %.

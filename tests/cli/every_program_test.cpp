@@ -123,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(
         ProgramCommand{
             "curves",
             ESVR_COMPARE,
-            {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}},
+            {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}}),
     [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace

@@ -231,8 +231,6 @@ Table curvesTests() {
           {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}};
 }
 
-}
-
 std::vector<Program> programs() {
   return {{"vdb2esvr", VDB2ESVR, "", vdb2esvrTests()},
           {"esvr2vdb", ESVR2VDB, "", esvr2vdbTests()},
@@ -240,7 +238,7 @@ std::vector<Program> programs() {
           {"view", ESVR_VIEW, "", viewTests()},
           {"check", ESVR_COMPARE, "check", checkTests()},
           {"table", ESVR_COMPARE, "table", tableTests()},
-          {"curves", ESVR_COMPARE, "curves", curvesTests()},
+          {"curves", ESVR_COMPARE, "curves", curvesTests()}};
 }
 
 /// The short name of each long name, such as "-g" for "--grid"; empty if there is none.

@@ -115,31 +115,6 @@ TEST(ConvertToPsnr, ReachesItForFramesInFewerBytes) {
   }
 }
 
-/// Four frames of waves that move by a third of a voxel a frame.
-TEST(ConvertToPsnr, LetsFramesFlickerLessWhereTheyKeepPastErrors) {
-  std::vector<SparseVolume> frames(4, test::smoothVolume());
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    for (std::size_t i = 0; i < frames[f].values.size(); ++i)
-      frames[f].values[i] *= 1.0f + 0.3f * std::sin(0.9f * (float(i % 8) - float(f) / 3.0f));
-  ConvertOptions options = optionsFor(PsnrGoal{40.0});
-  options.representation = Representation::kVoxels;
-  const auto change = [&](bool keepsPastErrors) {
-    options.keepsPastErrors = keepsPastErrors;
-    std::vector<StoredGrid> made;
-    double sum = 0.0;
-    for (std::size_t f = 0; f < frames.size(); ++f) {
-      options.previous = f > 0 ? &made.back() : nullptr;
-      StoredGrid grid = convertVolume({kDescriptor, frames[f]}, options).grid;
-      if (f > 0)
-        sum +=
-            temporalPsnr({frames[f - 1], frames[f]}, {decodeGrid(made.back()), decodeGrid(grid)});
-      made.push_back(std::move(grid));
-    }
-    return sum / double(frames.size() - 1);
-  };
-  EXPECT_GT(change(true), change(false));
-}
-
 TEST(ConvertToPsnr, TakesNoMoreEllipsoidsThanAllowed) {
   const SparseVolume volume = test::tubeVolume();
   ConvertOptions options = optionsFor(PsnrGoal{90.0});

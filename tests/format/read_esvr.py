@@ -167,11 +167,13 @@ class Decoder:
 
     def raw(self, bits):
         value = 0
-        for _ in range(bits):
-            self.range >>= 1
-            one = self.code >= self.range
-            self.code -= self.range if one else 0
-            value = value << 1 | one
+        while bits > 0:
+            now = min(bits, 12)
+            bits -= now
+            self.range >>= now
+            piece = min(self.code // self.range, (1 << now) - 1)
+            self.code -= self.range * piece
+            value = value << now | piece
             self.fill()
         return value
 

@@ -41,7 +41,7 @@ TEST(HtmlPage, hasItsTitleAsHeadlineWithoutAFinding) {
 
 TEST(HtmlPage, hasColorsForLightAndDark) {
   EXPECT_THAT(toHtml(framedPage()), HasSubstr(std::string(pageStyle())));
-  EXPECT_THAT(std::string(pageStyle()), HasSubstr("prefers-color-scheme: dark"));
+  EXPECT_THAT(std::string(pageStyle()), HasSubstr("prefers-color-scheme:dark"));
 }
 
 TEST(HtmlPage, namesNothingOutsideItself) {
