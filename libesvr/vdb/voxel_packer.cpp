@@ -10,7 +10,6 @@
 #include "vdb/make_nano.h"
 #include "vdb/stream_archive.h"
 #include "vdb/trees.h"
-#include "vdb/trees.h"
 #include "vdb/volume_to_tree.h"
 
 namespace esvr::vdb {

@@ -106,24 +106,24 @@ TEST_P(EveryProgram, takesANumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, EveryProgram,
-    testing::Values(
-        ProgramCommand{
-            "vdb2esvr",
-            VDB2ESVR,
-            {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9", "--iterations", "30"}},
-        ProgramCommand{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
-        ProgramCommand{
-            "render",
-            ESVR_RENDER,
-            {"DIR/in.esvr", "DIR/o.png", "--force", "--resolution", "16x16", "--device", "cpu"}},
-        ProgramCommand{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
-        ProgramCommand{"table",
-                       ESVR_COMPARE,
-                       {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
-        ProgramCommand{
-            "curves",
-            ESVR_COMPARE,
-            {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o", "DIR/c", "--force"}}),
+    testing::Values(ProgramCommand{"vdb2esvr",
+                                   VDB2ESVR,
+                                   {"DIR/in.vdb", "DIR/o.esvr", "--force", "--count", "9",
+                                    "--iterations", "30"}},
+                    ProgramCommand{"esvr2vdb", ESVR2VDB, {"DIR/in.esvr", "DIR/o.vdb", "--force"}},
+                    ProgramCommand{"render",
+                                   ESVR_RENDER,
+                                   {"DIR/in.esvr", "DIR/o.png", "--force", "--resolution", "16x16",
+                                    "--device", "cpu"}},
+                    ProgramCommand{"check", ESVR_COMPARE, {"check", "DIR/in.vdb", "DIR/in.esvr"}},
+                    ProgramCommand{
+                        "table",
+                        ESVR_COMPARE,
+                        {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
+                    ProgramCommand{"curves",
+                                   ESVR_COMPARE,
+                                   {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o",
+                                    "DIR/c", "--force"}}),
     [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
