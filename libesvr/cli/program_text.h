@@ -10,7 +10,7 @@ namespace esvr::cli {
 /// they are. The other texts are printed unchanged.
 struct ProgramText {
   std::string name;       ///< "esvr-sample"
-  std::string purpose;    ///< what the program does
+  std::string purpose;    ///< The text says what the program does.
   std::string usage;      ///< command lines that begin with the name
   std::string notes;      ///< input, output and exit codes; may be empty
   std::string details{};  ///< notes that only `--help expert` and the man page have; may be empty

@@ -37,7 +37,7 @@ class ByteCoder {
   /// lists of numbers of four bytes.
   static constexpr std::size_t kAlike = 5;
   static constexpr std::size_t kLongest = 15;  ///< lengths from here on have one model
-  static constexpr int kPlaceBits = 16;        ///< of the table of places, which takes 512 KB
+  static constexpr int kPlaceBits = 16;        ///< The table of places has 2^16 rows, 512 KB.
 
   /// A new context knows nothing of a bit, so that the bits before in the same byte are its context then.
   template <class Side>

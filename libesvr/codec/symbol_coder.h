@@ -86,7 +86,7 @@ class NumberModelOf {
 
  private:
   static constexpr int kModelled = 3;
-  static constexpr int kRawAtOnce = 2 * kRawBitsAtOnce;  // what a call of raw() takes
+  static constexpr int kRawAtOnce = 2 * kRawBitsAtOnce;  // raw() takes that many bits in a call
   TreeModel<kWidthBits> width_;
   std::array<std::array<BitModel, std::size_t{1} << kModelled>, std::size_t{1} << kWidthBits> bits_;
 };

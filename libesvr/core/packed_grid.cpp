@@ -85,7 +85,7 @@ class MaskMaker {
   explicit MaskMaker(const Strides& strides) : strides_(strides) {
     const auto axes = axesByStride(strides);
     for (std::size_t a = 0; a < 3; ++a) {
-      constexpr std::array<int, 3> kShifts{6, 3, 0};  // of a coordinate in voxelOffset
+      constexpr std::array<int, 3> kShifts{6, 3, 0};  // voxelOffset shifts coordinates so
       axes_[a] = std::size_t(axes[a]);
       steps_[a] = strides[axes_[a]];
       shifts_[a] = kShifts[axes_[a]];

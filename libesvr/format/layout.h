@@ -58,7 +58,7 @@ enum class Codec : std::uint16_t {
   kRaw = 0,
   kBytes = 1,
   kFloats = 2,
-  kBlosc = 3,  ///< of carried bytes only
+  kBlosc = 3,  ///< Only carried bytes have this codec.
 };
 
 /// Flags of a section.

@@ -175,7 +175,7 @@ template <class Value>
 struct VolumeTopology {
   std::size_t component;
   InactiveCounter& inactive;
-  std::vector<Coord> leaves{};  ///< in the file's order
+  std::vector<Coord> leaves{};  ///< They have the file's order.
   std::vector<Coord> bricks{};  ///< corners of all bricks with an active voxel
   std::vector<TileSource> activeTiles{};
 

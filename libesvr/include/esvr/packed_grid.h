@@ -42,7 +42,7 @@ inline constexpr std::uint64_t kBytesPerPackedBrick = sizeof(PackedBrick) + 160;
 template <class T>
 struct PackedVoxels {
   T background{};
-  std::vector<PackedBrick> bricks;  ///< in strictly increasing order of their corners
+  std::vector<PackedBrick> bricks;  ///< Their corners increase strictly.
   /// Values of active voxels, in the order of voxelOffset in each brick.
   std::vector<std::vector<T>> parts;
 
