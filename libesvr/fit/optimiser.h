@@ -11,7 +11,6 @@
 #include "esvr/device.h"
 #include "esvr/fit.h"
 #include "fit/adam.h"
-#include "fit/ellipsoid.h"
 #include "fit/target.h"
 #include "fit/tuning.h"
 

@@ -2,12 +2,93 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "esvr/error.h"
-#include "fit/kappa_descent.h"
 
 namespace esvr {
+
+double psnrOf(double squaredSum, double voxels, double peak) {
+  if (squaredSum <= 0.0) return kPerfectPsnr;
+  return std::min(kPerfectPsnr, 10.0 * std::log10(peak * peak * voxels / squaredSum));
+}
+
+double Recorder::seconds() const {
+  return std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+const TimedCurvePoint& Recorder::record(const FitErrors& errors, std::size_t ellipsoids,
+                                        std::uint32_t iteration) {
+  TimedCurvePoint point;
+  point.seconds = seconds();
+  point.iteration = iteration;
+  point.ellipsoids = ellipsoids;
+  point.psnrBox = psnrOf(errors.squaredSumBox, target_.boxVoxels, target_.peak);
+  point.psnrActive = psnrOf(errors.squaredSumActive, double(target_.activeVoxels), target_.peak);
+  point.maxError = errors.largest / target_.scale;
+  curve_.push_back(point);
+  return curve_.back();
+}
+
+void Recorder::report(const TimedCurvePoint& now, double fraction) {
+  constexpr double kInterval = 0.25;  // seconds
+  if (!options_.progress || now.seconds - lastReport_ < kInterval) return;
+  lastReport_ = now.seconds;
+  FitProgress progress{.point = now, .fraction = fraction};
+  addRates(progress, target_.activeVoxels);
+  options_.progress(progress);
+}
+
+void addRates(FitProgress& progress, std::uint64_t activeVoxels) {
+  const double seconds = progress.point.seconds, fraction = progress.fraction;
+  if (seconds <= 0.0 || fraction <= 0.0) return;
+  progress.secondsLeft = seconds * (1.0 - fraction) / fraction;
+  progress.voxelsPerSecond = double(activeVoxels) * fraction / seconds;
+}
+
+float KappaDescent::next(float kappa, double slope, double factor) {
+  // The averages are short, because there are few steps and every relocation changes the slope.
+  constexpr double kBeta1 = 0.7, kBeta2 = 0.9;
+  if (slope == 0.0) return kappa;
+  mean_ = kBeta1 * mean_ + (1.0 - kBeta1) * slope;
+  square_ = kBeta2 * square_ + (1.0 - kBeta2) * slope * slope;
+  meanWeight_ = kBeta1 * meanWeight_ + (1.0 - kBeta1);
+  squareWeight_ = kBeta2 * squareWeight_ + (1.0 - kBeta2);
+  const double direction = mean_ / meanWeight_ / std::sqrt(square_ / squareWeight_);
+  return float(std::clamp(kappa - factor * largestStep_ * direction, kSmoothest, kHardest));
+}
+
+void applyOptions(const FitOptions& options, FitTarget& target) {
+  target.saturates = true;
+  target.narrowBand = options.narrowBand;
+  target.bothSigns = options.bothSigns.value_or(false);
+}
+
+float firstKappa(const FitOptions& options, const Tuning& tuning) {
+  if (options.kappa) return *options.kappa;
+  return options.start ? options.start->kernel.kappa : tuning.firstKappa;
+}
+
+std::size_t firstSeeds(std::size_t count, const Tuning& tuning) {
+  const auto share = std::size_t(std::llround(tuning.firstShare * double(count)));
+  return std::clamp<std::size_t>(share, 1, count);
+}
+
+bool anyNegative(std::span<const Ellipsoid> ellipsoids) {
+  return std::any_of(ellipsoids.begin(), ellipsoids.end(),
+                     [](const Ellipsoid& p) { return p.intensity < 0.0; });
+}
+
+FitResult emptyFit(const SparseVolume& volume, float kappa) {
+  FitResult result;
+  result.field.background = volume.background;
+  result.field.kernel.kappa = kappa;
+  result.range = {volume.background, volume.background};
+  TimedCurvePoint point;
+  point.psnrBox = point.psnrActive = kPerfectPsnr;
+  result.curve.push_back(point);
+  return result;
+}
+
 namespace {
 
 constexpr std::uint32_t kCurvePoints = 32;
@@ -43,7 +124,7 @@ class FitRun {
     while (!finished()) {
       if (recorder_.cancelled()) return FitEnd::kCancelled;
       if (isEvent() && !isDoneBefore()) events();
-      if (plan_.curve && done_ % recordInterval() == 0) recorder_.record(optimiser_, done_);
+      if (plan_.curve && done_ % recordInterval() == 0) record();
       const double psnr = psnrOf(iterate(), target_.boxVoxels, target_.peak);
       report(psnr);
       if (plan_.psnr && psnr > *plan_.psnr && reachedExactly()) return FitEnd::kPsnrReached;
@@ -115,10 +196,12 @@ class FitRun {
     recorder_.report(now, fractionDone());
   }
 
-  /// Measures the errors now; the loss of an iteration is that before its step.
-  bool reachedExactly() {
-    return recorder_.record(optimiser_, done_).psnrBox > *plan_.psnr + kReachedMargin;
+  const TimedCurvePoint& record() {
+    return recorder_.record(optimiser_.measure(), optimiser_.ellipsoidCount(), done_);
   }
+
+  /// Measures the errors now; the loss of an iteration is that before its step.
+  bool reachedExactly() { return record().psnrBox > *plan_.psnr + kReachedMargin; }
 
   Optimiser& optimiser_;
   const FitTarget& target_;
@@ -131,11 +214,6 @@ class FitRun {
 };
 
 }  // namespace
-
-std::size_t firstSeeds(std::size_t count, const Tuning& tuning) {
-  const auto share = std::size_t(std::llround(tuning.firstShare * double(count)));
-  return std::clamp<std::size_t>(share, 1, count);
-}
 
 RunEnd run(Optimiser& optimiser, const FitTarget& target, Recorder& recorder, const RunPlan& plan,
            const Tuning& tuning) {

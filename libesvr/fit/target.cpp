@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <optional>
-#include <span>
 
 #include "core/parallel.h"
 #include "esvr/metrics.h"
@@ -91,6 +89,35 @@ FitTarget makeTarget(const SparseVolume& volume, const Box& box, const TargetSca
 FitTarget makeTarget(const SparseVolume& volume, const std::optional<Box>& box,
                      std::optional<double> peak) {
   return makeTarget(volume, boxOf(volume, box), scaleOf(volume, peak));
+}
+
+ValueRange rangeOf(float background, const TargetScale& scale) {
+  return {float(background + scale.lowest / scale.scale),
+          float(background + scale.highest / scale.scale)};
+}
+
+SignsAllowed signsOf(const FitTarget& target) {
+  return {.positive = target.bothSigns || target.highest > 0.0,
+          .negative = target.bothSigns || target.lowest < 0.0};
+}
+
+EllipsoidLimits limitsOf(const FitTarget& target, const Tuning& tuning) {
+  const double range = target.highest - target.lowest;
+  const double lowest = target.bothSigns ? -range : target.lowest;
+  const double highest = target.bothSigns ? range : target.highest;
+  return {tuning.smallestScale, std::min(tuning.largestScale, target.largestScale),
+          tuning.intensityHeadroom * lowest, tuning.intensityHeadroom * highest};
+}
+
+int seedWindow(const FitTarget& target, std::size_t ellipsoids, const Tuning& tuning) {
+  constexpr int kSmallest = 2, kLargest = 6;  // voxels
+  const double distance =
+      std::cbrt(double(target.activeVoxels) / double(std::max<std::size_t>(ellipsoids, 1)));
+  return std::clamp(int(std::lround(tuning.seedWindow * distance)), kSmallest, kLargest);
+}
+
+FitSize sizeOf(const FitTarget& target) {
+  return {target.bricks.size(), target.activeVoxels, target.narrowBand, !target.constants.empty()};
 }
 
 }  // namespace esvr

@@ -1,5 +1,6 @@
 #pragma once
-/// The target of a fit: the volume less its background, scaled by a power of two.
+/// The target of a fit: the volume less its background, scaled by a power of two, and the values
+/// that a fit derives from it on any device.
 
 #include <cstddef>
 #include <cstdint>
@@ -8,7 +9,11 @@
 #include <span>
 #include <vector>
 
+#include "esvr/fit.h"
 #include "esvr/sparse_volume.h"
+#include "fit/adam.h"
+#include "fit/seed.h"
+#include "fit/tuning.h"
 
 namespace esvr {
 
@@ -17,6 +22,9 @@ struct TargetScale {
   double scale = 1.0;                  ///< a power of two, so that scaling is exact
   double peak = 1.0;                   ///< scaled peak of the PSNR
   double lowest = 0.0, highest = 0.0;  ///< range of the scaled values and 0
+
+  /// True if all values equal the background, of which the empty sum is exact.
+  [[nodiscard]] bool empty() const { return lowest == 0.0 && highest == 0.0; }
 };
 
 struct FitTarget : TargetScale {
@@ -66,5 +74,26 @@ struct VolumePart {
 /// \param box  box of the PSNR, relative to the volume's origin
 [[nodiscard]] FitTarget makeTarget(const VolumePart& part, const Box& box,
                                    const TargetScale& scale);
+
+/// The range of a volume's values, to which sums are clamped.
+[[nodiscard]] ValueRange rangeOf(float background, const TargetScale& scale);
+
+/// The signs that seeds may have.
+[[nodiscard]] SignsAllowed signsOf(const FitTarget& target);
+
+[[nodiscard]] EllipsoidLimits limitsOf(const FitTarget& target, const Tuning& tuning);
+
+/// Half width of a seed's window: Tuning::seedWindow times the distance that the ellipsoids would
+/// have if they were spread evenly over the active voxels.
+[[nodiscard]] int seedWindow(const FitTarget& target, std::size_t ellipsoids, const Tuning& tuning);
+
+/// The numbers that determine the memory of a fit.
+struct FitSize {
+  std::size_t bricks = 0;
+  std::uint64_t activeVoxels = 0;
+  bool narrowBand = false;  ///< see FitOptions
+  bool constants = false;   ///< the target has constants
+};
+[[nodiscard]] FitSize sizeOf(const FitTarget& target);
 
 }  // namespace esvr

@@ -14,10 +14,7 @@
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
-#include "fit/chunks/chunk_target.h"
-#include "fit/chunks/chunks_for.h"
-#include "fit/chunks/divide_bricks.h"
-#include "fit/chunks/whole_progress.h"
+#include "fit/chunks/fit_in_chunks.h"
 #include "fit/cpu/cpu_pass.h"
 #include "random_ellipsoids.h"
 #include "support/on_device.h"
@@ -33,6 +30,11 @@ std::vector<BrickChunk> chunksOf(const SparseVolume& volume) {
   FitOptions options;
   options.chunkVoxels = kChunkVoxels;
   return chunksFor(volume, options);
+}
+
+FitScene sceneOf(const SparseVolume& volume, std::span<const BrickChunk> chunks) {
+  static const FitOptions options;
+  return {volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2, options};
 }
 
 std::vector<float> residualsOf(const FitTarget& target, const Kernel& kernel,
@@ -55,9 +57,8 @@ TEST_P(Constants, ActLikeEllipsoidsThatAreNotFitted) {
   const std::vector<Ellipsoid> fitted(all.begin(), all.begin() + 30),
       ghosts(all.begin() + 30, all.end());
   const auto chunks = divideBricks(volume, volume.brickCount());
-  const ChunkScene scene{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2};
-  ChunkTarget part;
-  makeChunkTarget(scene, chunks.front(), {ghosts, kernel}, part);
+  const FitScene scene = sceneOf(volume, chunks);
+  ChunkTarget part(scene, chunks.front(), {ghosts, kernel});
   ASSERT_FALSE(part.target.constants.empty());
   part.target.saturates = GetParam();
   FitTarget whole = makeTarget(volume, std::nullopt);
@@ -70,37 +71,14 @@ INSTANTIATE_TEST_SUITE_P(Sums, Constants, testing::Bool(), [](const auto& satura
   return saturates.param ? "Clamped" : "NotClamped";
 });
 
-/// A row of bricks whose voxels are all active.
-SparseVolume rowOfBricks(std::int32_t count) {
-  SparseVolume volume;
-  for (std::int32_t x = 0; x < count; ++x) volume.bricks.push_back({x, 0, 0});
-  volume.active.resize(volume.brickCount());
-  for (BrickMask& mask : volume.active) mask.setAll();
-  volume.values.assign(volume.brickCount() * kBrickVoxels, 1.0f);
-  return volume;
-}
-
-// A fit takes about 8 KB of the host's memory for each brick (chunks_for.cpp).
-TEST(ChunksFor, DividesAVolumeWhoseFitExceedsTheMemoryOfTheHost) {
-  const SparseVolume volume = rowOfBricks(2000);
-  FitOptions options;
-  options.count = 100;
-  EXPECT_LE(chunksFor(volume, options).size(), 1u);
-  options.maxHostBytes = 20'000'000;
-  EXPECT_LE(chunksFor(volume, options).size(), 1u);
-  options.maxHostBytes = 9'500'000;
-  EXPECT_EQ(chunksFor(volume, options).size(), 2u);
-}
-
 TEST(ChunkTarget, CountsItsOwnVoxelsOnly) {
   const SparseVolume volume = test::tubeVolume();
   const auto chunks = divideBricks(volume, 10);
-  const ChunkScene scene{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2};
+  const FitScene scene = sceneOf(volume, chunks);
   std::uint64_t counted = 0;
   double boxVoxels = 0.0;
   for (const BrickChunk& chunk : chunks) {
-    ChunkTarget part;
-    makeChunkTarget(scene, chunk, {}, part);
+    const ChunkTarget part(scene, chunk, {});
     for (const BrickMask& mask : part.counted) counted += std::uint64_t(mask.count());
     boxVoxels += part.target.boxVoxels;
   }
@@ -244,8 +222,7 @@ TEST(FitInChunks, ReportsProgressOfTheWholeFit) {
 TEST(WholeProgress, DoesNotGoBackWhereAPartEnds) {
   const SparseVolume volume = test::tubeVolume();
   const auto chunks = divideBricks(volume, 10);
-  const FitOptions options;
-  const FitScene scene{{volume, chunks, scaleOf(volume), boxOf(volume, std::nullopt), 2}, options};
+  const FitScene scene = sceneOf(volume, chunks);
   std::vector<double> fractions;
   WholeProgress progress(scene, [&](const FitProgress& p) { fractions.push_back(p.fraction); });
   FitProgress now;

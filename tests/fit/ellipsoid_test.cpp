@@ -1,14 +1,17 @@
 // Plan: steps move and scale the semi-axes as ellipsoid.h states, and limits hold. Principal axes
-// describe the same shape, also for thin and flat ellipsoids. Export loses only float32 precision.
+// describe the same shape, also for thin and flat ellipsoids. Export loses only float32 precision,
+// and gives as few chunks as float32 centers allow, each relative to its chunk. A field that is
+// imported and exported again is the same field.
 
-#include "fit/ellipsoid_math.h"
+#include "fit/ellipsoid.h"
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "../field/random_field.h"
-#include "fit/export_field.h"
 
 namespace esvr {
 namespace {
@@ -80,6 +83,78 @@ TEST_P(Aspect, ExportKeepsTheShape) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(Shapes, Aspect, testing::Values(1.0, 10.0, 1000.0));
+
+using Center = std::array<double, 3>;
+
+/// A ball with a scale of 1 and an intensity of 2 at each center.
+Field exported(const std::vector<Center>& centers, const ExportFrame& frame = {}) {
+  std::vector<Ellipsoid> ellipsoids(centers.size());
+  for (std::size_t i = 0; i < centers.size(); ++i) {
+    ellipsoids[i].center = centers[i];
+    ellipsoids[i].L = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+    ellipsoids[i].intensity = 2.0;
+  }
+  return exportField(ellipsoids, frame);
+}
+
+ExportFrame frameAt(Coord origin) {
+  ExportFrame frame;
+  frame.origin = origin;
+  return frame;
+}
+
+constexpr double kChunkSide = kChunkExtent;
+
+TEST(ExportField, KeepsCentersALittleBeforeTheOriginInOneChunk) {
+  const Field field =
+      exported({{-0.25, 3.0, 0.0}, {10.0, -7.5, kChunkSide - 1.0}}, frameAt({8, 16, 24}));
+  ASSERT_EQ(field.chunks.size(), 1u);
+  EXPECT_EQ(field.chunks[0].origin, (Coord{8, 16, 24}));
+  const Ellipsoids& e = field.chunks[0].ellipsoids;
+  EXPECT_EQ(e.center[0], (std::vector<float>{-0.25f, 10.0f}));
+  EXPECT_EQ(e.center[1], (std::vector<float>{3.0f, -7.5f}));
+}
+
+TEST(ExportField, DividesCentersThatAreTooFarForOneChunk) {
+  const Field field = exported({{-0.25, 0.0, 0.0}, {5.0, 0.0, 0.0}, {kChunkSide + 1.5, 0.0, 0.0}},
+                               frameAt({8, 0, 0}));
+  ASSERT_EQ(field.chunks.size(), 3u);
+  const std::array<float, 3> centers{float(kChunkSide) - 0.25f, 5.0f, 1.5f};
+  for (std::size_t c = 0; c < 3; ++c) {
+    EXPECT_EQ(field.chunks[c].origin, (Coord{8 + (int(c) - 1) * kChunkExtent, 0, 0}));
+    EXPECT_EQ(field.chunks[c].ellipsoids.center[0], std::vector<float>{centers[c]});
+  }
+}
+
+TEST(ExportField, MayHaveNoEllipsoids) { EXPECT_TRUE(exported({}).chunks.empty()); }
+
+TEST(ExportField, GivesIntensitiesInUnitsOfTheGrid) {
+  ExportFrame frame;
+  frame.scale = 0.5;
+  frame.background = 0.25f;
+  const Field field = exported({{1.0, 1.0, 1.0}}, frame);
+  EXPECT_EQ(field.background, 0.25f);
+  EXPECT_EQ(field.chunks[0].ellipsoids.intensity, std::vector<float>{4.0f});
+}
+
+TEST(ImportField, IsTheWayBack) {
+  const Field field = test::randomField(
+      {.count = 200, .extent = 200.0, .smallest = 0.5, .aspect = 50.0, .origin = {64, 0, 128}});
+  const Coord origin{64, 0, 128};
+  const Field back = exportField(importField(field, origin, 0.5),
+                                 {.origin = origin, .scale = 0.5, .kernel = field.kernel});
+  ASSERT_EQ(back.chunks.size(), 1u);
+  const Ellipsoids &a = field.chunks[0].ellipsoids, &b = back.chunks[0].ellipsoids;
+  EXPECT_EQ(a.center, b.center);
+  EXPECT_EQ(a.intensity, b.intensity);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    // The axes may come back in another order, but the matrix is the same to float32 precision.
+    const Matrix3 A = inverse(unitFrame(a, i)), B = inverse(unitFrame(b, i));
+    const double size = sigma(A, 0, 0) + sigma(A, 1, 1) + sigma(A, 2, 2);
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) EXPECT_NEAR(sigma(A, r, c), sigma(B, r, c), 1e-5 * size) << i;
+  }
+}
 
 }  // namespace
 }  // namespace esvr

@@ -12,9 +12,8 @@
 #include "esvr/sparse_volume.h"
 #include "fit/adam.h"
 #include "fit/ellipsoid.h"
-#include "fit/ellipsoid_math.h"
 #include "fit/target.h"
-#include "reference_sum.h"
+#include "random_ellipsoids.h"
 
 namespace esvr::test {
 

@@ -2,8 +2,8 @@
 // compared with central differences of a float64 sum over all voxels of a dense box. This is done
 // for a random field, including bricks that only supports reach, and for ellipsoids of every shape
 // and kernel (gradient_cases.h). For these shapes the adjoint identity <g, dV> = <dL, dtheta> is
-// checked for a random g, in the pass of the default fit, where g is the residual of a random
-// target, and in the pass of the paper's method, whose input is g.
+// checked for a random g: the residual of a random target, as in the default fit, and a given g, as
+// in the paper's method.
 
 #include <gtest/gtest.h>
 
@@ -11,12 +11,10 @@
 #include <cmath>
 
 #include "fit/cpu/cpu_pass.h"
-#include "fit/ellipsoid_math.h"
-#include "fit/paper/cpu_paper_pass.h"
-#include "fit/parameter_gradient.h"
+#include "fit/ellipsoid.h"
+#include "fit/gradient.h"
 #include "gradient_cases.h"
 #include "random_ellipsoids.h"
-#include "reference_sum.h"
 
 namespace esvr {
 namespace {
@@ -132,9 +130,7 @@ class GradientCases : public testing::TestWithParam<test::GradientCase> {
     return found;
   }
   [[nodiscard]] std::vector<EllipsoidGradient> gradientsOf(const std::vector<double>& g) const {
-    const paper::PopulationKernels kernels{{kernelConstants<float>({.kappa = GetParam().kappa})},
-                                           {supportRadius(kernel_)}};
-    paper::CpuPaperPass pass(target_.get(), kernels);
+    CpuPass pass(target_.get(), kernel_);
     pass.rebuild(ellipsoids_, 0.1);
     std::vector<EllipsoidGradient> found(ellipsoids_.size());
     pass.gradients(ellipsoids_, std::vector<float>(g.begin(), g.end()), found);

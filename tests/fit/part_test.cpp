@@ -62,10 +62,9 @@ class PartKeys : public testing::Test {
     in.start.ghosts = test::randomEllipsoids(3, 1.0, 2.0);
     change(in);
     const auto chunks = divideBricks(in.volume, 10);
-    return keyOf(
-        FitScene{{in.volume, chunks, scaleOf(in.volume), boxOf(in.volume, std::nullopt), in.halo},
-                 in.options},
-        in.start);
+    return keyOf(FitScene{in.volume, chunks, scaleOf(in.volume), boxOf(in.volume, std::nullopt),
+                          in.halo, in.options},
+                 in.start);
   }
 };
 

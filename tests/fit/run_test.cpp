@@ -1,11 +1,14 @@
 // Plan: an optimiser that does nothing notes when a run grows, relocates and changes kappa. A run
-// in parts must do so at the same iterations as a run in one part.
+// in parts must do so at the same iterations as a run in one part. The descent on kappa goes against
+// the slope, whatever its size, by at most the largest step, stays within its limits, does not move
+// without a slope, and finds the minimum of a convex function.
 
 #include "fit/run.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <vector>
 
 namespace esvr {
@@ -75,6 +78,35 @@ TEST(Run, InPartsHasTheEventsOfARunInOnePart) {
     runPart(kEnds[part - 1], kEnds[part], parts);
   EXPECT_FALSE(whole.relocate.empty());
   EXPECT_EQ(parts, whole);
+}
+
+TEST(KappaDescent, StepsAgainstTheSlopeWhateverItsSize) {
+  for (const double size : {1e-12, 1.0, 1e12}) {
+    EXPECT_FLOAT_EQ(KappaDescent(0.1).next(2.0f, size, 1.0), 1.9f);
+    EXPECT_FLOAT_EQ(KappaDescent(0.1).next(2.0f, -size, 0.5), 2.05f);
+  }
+}
+
+TEST(KappaDescent, StaysWithoutASlope) { EXPECT_EQ(KappaDescent(0.1).next(2.0f, 0.0, 1.0), 2.0f); }
+
+TEST(KappaDescent, KeepsToItsBounds) {
+  KappaDescent down(10.0), up(10.0);
+  float low = 0.0f, high = 0.0f;
+  for (int i = 0; i < 10; ++i) {
+    low = down.next(low, 1.0, 1.0);
+    high = up.next(high, -1.0, 1.0);
+  }
+  EXPECT_EQ(low, float(KappaDescent::kSmoothest));
+  EXPECT_EQ(high, float(KappaDescent::kHardest));
+}
+
+TEST(KappaDescent, FindsAValley) {
+  KappaDescent descent(0.1);
+  float kappa = -2.0f;
+  const int steps = 200;
+  for (int i = 0; i < steps; ++i)
+    kappa = descent.next(kappa, 1e-5 * (double(kappa) - 3.0), 1.0 - double(i) / steps);
+  EXPECT_NEAR(kappa, 3.0f, 0.02f);  // the last steps are shorter than 0.01
 }
 
 }  // namespace

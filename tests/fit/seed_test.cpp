@@ -1,12 +1,14 @@
 // Plan: voxels are sampled in proportion to the squared residual of the allowed signs only. The
-// center, the covariance and the height of a seed follow from the residual around it.
-
-#include "fit/cpu/seed.h"
+// center, the covariance and the height of a seed follow from the residual around it. In the
+// Gaussian limit the kernel's moments have closed forms; a harder kernel is wider.
 
 #include <gtest/gtest.h>
 
 #include <array>
 #include <cmath>
+#include <numbers>
+
+#include "fit/cpu/residual.h"
 
 namespace esvr {
 namespace {
@@ -70,6 +72,23 @@ TEST(Seed, TakesPlaceAndHeightFromTheResidual) {
   EXPECT_NEAR(seeds[0].intensity + seeds[1].intensity + seeds[2].intensity, 0.5, 1e-7);
   const PrincipalAxes axes = principalAxes(seeds[1].L);
   EXPECT_GT(axes.scale[0], 1.4 * axes.scale[1]);  // longer along the bar
+}
+
+KernelMoments momentsOf(const Kernel& kernel) {
+  return kernelMoments(kernelConstants<double>(kernel));
+}
+
+TEST(KernelMoments, AreThoseOfTheGaussian) {
+  // e^-m has the mass pi^(3/2) and the variance 1/2 along each axis; what eps cuts off goes to zero
+  // with it.
+  const KernelMoments moments = momentsOf({.kappa = -30.0f, .epsilon = 1e-9f});
+  EXPECT_NEAR(moments.variance, 0.5, 1e-4);
+  EXPECT_NEAR(moments.mass, std::pow(std::numbers::pi, 1.5), 1e-4);
+}
+
+TEST(KernelMoments, AreLargerForAHarderKernel) {
+  EXPECT_GT(momentsOf({.kappa = 5.0f}).variance, 0.8);
+  EXPECT_GT(momentsOf({.kappa = 5.0f}).mass, momentsOf({.kappa = 2.0f}).mass);
 }
 
 }  // namespace

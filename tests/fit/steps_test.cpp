@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "fit/adam.h"
-#include "fit/schedule.h"
+#include "fit/tuning.h"
 #include "volumes.h"
 
 namespace esvr {

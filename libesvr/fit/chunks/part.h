@@ -5,14 +5,16 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
+#include "esvr/device.h"
 #include "esvr/fit.h"
 #include "esvr/part_runner.h"
-#include "fit/chunks/chunk_target.h"
-#include "fit/chunks/device_turns.h"
-#include "fit/chunks/divide_bricks.h"
+#include "fit/chunks/divide.h"
 #include "fit/run.h"
 
 namespace esvr {
@@ -29,6 +31,37 @@ inline constexpr int kRounds = int(kRoundEnds.size()) - 1;
 
 /// The brick that contains the center of an ellipsoid.
 [[nodiscard]] Coord brickWith(const Ellipsoid& p);
+
+/// A fit in chunks, as far as it does not change with the rounds.
+struct FitScene {
+  const SparseVolume& volume;
+  std::span<const BrickChunk> chunks;
+  TargetScale scale;  ///< the units and the range of the whole volume, which all chunks share
+  Box box;            ///< box of the PSNR, relative to the volume's origin
+  int halo;           ///< see haloBricks()
+  const FitOptions& options;
+};
+
+/// Ellipsoids that are not fitted but take part in the sum.
+struct Ghosts {
+  std::span<const Ellipsoid> ellipsoids;  ///< relative to the volume's origin, in its scaled units
+  Kernel kernel;
+};
+
+/// The chunk's part of the box of the PSNR.
+[[nodiscard]] Box boxOf(const FitScene& scene, const BrickChunk& chunk);
+
+/// The target of a chunk's fit, which consists of the bricks of the chunk and of its halo. Its PSNR
+/// counts the chunk's own part of the box. It is pinned, because the target points to the other
+/// member.
+struct ChunkTarget {
+  ChunkTarget(const FitScene& scene, const BrickChunk& chunk, const Ghosts& ghosts);
+  ChunkTarget(const ChunkTarget&) = delete;
+  ChunkTarget& operator=(const ChunkTarget&) = delete;
+
+  std::vector<BrickMask> counted;  ///< active voxels of the chunk's bricks; none of the halo's
+  FitTarget target;
+};
 
 /// What the fit of a part begins with.
 struct PartStart {
@@ -53,9 +86,25 @@ struct PartEnd {
   double secondsSeed = 0.0;
 };
 
-/// A fit in chunks, as far as it does not change with the rounds.
-struct FitScene : ChunkScene {
-  const FitOptions& options;
+/// Lets one part after the other use a GPU, so that another part can be prepared on the host
+/// meanwhile. Any thread may use it. While it exists, the memory of GPUs that parts have freed is
+/// kept for the next ones.
+class DeviceTurns {
+ public:
+  using Turn = std::unique_lock<std::mutex>;
+
+  /// Waits until no other part uses a GPU, until the turn is released. There is no waiting for the
+  /// CPU, on which parts may run at the same time.
+  [[nodiscard]] Turn take(const Device& device);
+
+ private:
+  struct Gpu {
+    std::mutex inUse;
+    std::shared_ptr<void> keptMemory;
+  };
+
+  std::mutex mutex_;
+  std::map<int, Gpu> gpus_;  ///< by their numbers
 };
 
 /// Where a part is fitted.

@@ -1,4 +1,4 @@
-#include "fit/cpu/cpu_intensity_passes.h"
+// IntensityPasses on the CPU.
 
 #include <tbb/enumerable_thread_specific.h>
 
@@ -6,7 +6,12 @@
 #include <bit>
 #include <cmath>
 
+#include "core/brick_index.h"
 #include "core/parallel.h"
+#include "field/brick_kernels.h"
+#include "field/evaluate_plan.h"
+#include "fit/cpu/cpu_pass.h"
+#include "fit/intensity_problem.h"
 
 namespace esvr {
 namespace {
@@ -40,7 +45,68 @@ bool contains(const Box& box, Coord corner) {
          box.contains(corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1});
 }
 
-}  // namespace
+/// Tapes of one brick that are kept between passes without gaps. The memory is reused.
+class KeptTapes {
+ public:
+  void keep(std::span<const PairTape> from) {
+    std::size_t floats = 0;
+    for (const PairTape& tape : from) floats += std::size_t(tape.floats);
+    if (floats > capacity_) {
+      capacity_ = floats + floats / kSpare;
+      phi_ = AlignedFloats(capacity_);
+    }
+    tapes_.assign(from.begin(), from.end());
+    float* at = phi_.get();
+    for (PairTape& tape : tapes_) {
+      std::copy_n(tape.phi, tape.floats, at);
+      tape.phi = at;
+      at += tape.floats;
+    }
+  }
+  [[nodiscard]] std::span<const PairTape> tapes() const { return tapes_; }
+
+ private:
+  static constexpr std::size_t kSpare = 8;  ///< 1/8 more is allocated, since shapes change a little
+  std::vector<PairTape> tapes_;
+  AlignedFloats phi_;
+  std::size_t capacity_ = 0;
+};
+
+class CpuIntensityPasses final : public IntensityPasses {
+ public:
+  explicit CpuIntensityPasses(const IntensityTarget& target);
+
+  void setShapes(const Field& field) override;
+  [[nodiscard]] StoredError error(std::span<const float> intensities) override;
+  StoredError gradient(std::span<const float> intensities, IntensityGradient& out) override;
+  void applyNormal(std::span<const double> direction, std::vector<double>& out) override;
+
+ private:
+  template <class Number>
+  void setForms(std::span<const Number> intensities);
+  /// Residuals of one brick; they are zero at voxels that a reader gets exactly.
+  StoredError residualOf(std::size_t brick, float* sum, BrickMask* exact) const;
+  std::span<const PairTape> forward(std::size_t brick, PairTapes& scratch, float* sum);
+  template <class Middle>
+  void pass(bool backward, const Middle& middle);
+  void sumPairs(float PairProjection::*value, std::vector<double>& out) const;
+  [[nodiscard]] StoredError total() const;
+
+  const SparseVolume& source_;
+  VoxelRule stored_;
+  Box box_;
+  bool restricted_;
+  BrickIndex known_;  ///< bricks that do not depend on the field
+  float background_ = 0.0f;
+  std::vector<Coord> corners_;        ///< corners of known bricks, then of others in reach
+  std::vector<const float*> wanted_;  ///< source's values of known bricks; null: background
+  EvaluatePlan plan_;
+  bool keeps_ = false, kept_ = false;  ///< whether tapes shall be kept, and are
+  std::vector<KeptTapes> tapes_;       ///< tapes of each brick
+  std::vector<PairProjection> projections_;
+  std::vector<StoredError> brickError_;
+  std::vector<BrickMask> exact_;
+};
 
 CpuIntensityPasses::CpuIntensityPasses(const IntensityTarget& target)
     : source_(target.source),
@@ -183,6 +249,12 @@ void CpuIntensityPasses::applyNormal(std::span<const double> direction, std::vec
   setForms(direction);
   pass(true, [&](std::size_t b, float* sum) { clearVoxels(exact_[b], sum); });
   sumPairs(&PairProjection::rPhi, out);
+}
+
+}  // namespace
+
+std::unique_ptr<IntensityPasses> makeCpuIntensityPasses(const IntensityTarget& target) {
+  return std::make_unique<CpuIntensityPasses>(target);
 }
 
 }  // namespace esvr

@@ -3,32 +3,61 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numeric>
 
 #include "core/add_seconds.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "field/gather.h"
-#include "fit/cpu/fit_errors.h"
-#include "fit/ellipsoid_math.h"
-#include "fit/kernel_moments.h"
-#include "fit/motion_bound.h"
-#include "fit/parameter_gradient.h"
-#include "fit/scene.h"
+#include "fit/cpu/residual.h"
+#include "fit/cuda/make_cuda.h"
 
 namespace esvr {
+
+std::unique_ptr<Optimiser> makeOptimiser(const FitTarget& target, const OptimiserOptions& options,
+                                         const Tuning& tuning) {
+  if (options.device.kind == DeviceKind::kCuda) return makeCudaOptimiser(target, options, tuning);
+  return std::make_unique<CpuOptimiser>(target, options, tuning);
+}
+
+void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
+              std::span<const EllipsoidGradient> gradients, const AdamStep& step) {
+  using Range = tbb::blocked_range<std::size_t>;
+  parallelFor(Range(0, ellipsoids.size(), 64), [&](const Range& range) {
+    for (std::size_t i = range.begin(); i != range.end(); ++i) {
+      Ellipsoid& p = ellipsoids[i];
+      const ParameterVector largest = largestStep(p, step.sizes);
+      moveWithin(p, adamDirection(states[i], gradients[i].byParameter, step.options, largest),
+                 step.limits);
+    }
+  });
+}
 
 CpuOptimiser::CpuOptimiser(const FitTarget& target, const OptimiserOptions& options,
                            const Tuning& tuning)
     : target_(target),
       options_(options),
       tuning_(tuning),
-      pass_(target, kernelConstants<double>(options.kernel)),
-      unitVariance_(kernelMoments(pass_.kernel()).variance),
+      kernel_(kernelConstants<double>(options.kernel)),
+      pass_(target, kernel_),
+      unitVariance_(kernelMoments(kernel_).variance),
       limits_(limitsOf(target, tuning)) {}
 
+void CpuOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
+  ellipsoids_.assign(ellipsoids.begin(), ellipsoids.end());
+  states_.assign(ellipsoids_.size(), {});
+  gradients_.assign(ellipsoids_.size(), {});
+  stale_ = true;
+}
+
+void CpuOptimiser::setState(const FitState& state) {
+  setEllipsoids(state.ellipsoids);
+  states_ = state.adam;
+  listed_.clear();
+  for (const Ellipsoid& p : ellipsoids_) listed_.push_back(unlisted(p));
+}
+
 void CpuOptimiser::rebuildLists() {
-  const double radius = supportRadius(pass_.kernel());
+  const double radius = supportRadius(kernel_);
   listed_.resize(ellipsoids_.size());
   parallelFor(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     listed_[i] = listedSupport(ellipsoids_[i], states_[i].steps, listed_[i], radius, tuning_.slack);
@@ -40,7 +69,7 @@ void CpuOptimiser::rebuildLists() {
 
 /// Whether an ellipsoid is beyond what the lists hold.
 bool CpuOptimiser::anyOutgrown() const {
-  const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
+  const double core = coreRadius(kernel_, tuning_.slack.missedShare);
   std::atomic<bool> any = false;
   parallelFor(std::size_t(0), ellipsoids_.size(), [&](std::size_t i) {
     if (!isHeld(listed_[i], ellipsoids_[i], core)) any = true;
@@ -50,7 +79,7 @@ bool CpuOptimiser::anyOutgrown() const {
 
 /// Takes a step, within what the lists hold.
 void CpuOptimiser::step(double factor) {
-  const double core = coreRadius(pass_.kernel(), tuning_.slack.missedShare);
+  const double core = coreRadius(kernel_, tuning_.slack.missedShare);
   const std::vector<Ellipsoid> before = ellipsoids_;
   adamStep(ellipsoids_, states_, gradients_,
            {.sizes = tuning_.steps.scaled(factor), .options = tuning_.adam, .limits = limits_});
@@ -60,6 +89,17 @@ void CpuOptimiser::step(double factor) {
   });
   refused_ += refused;
   stale_ = refused_ >= tuning_.slack.refusedSteps(ellipsoids_.size());
+}
+
+double CpuOptimiser::iterate(std::span<const double> factors) {
+  double loss = 0.0;
+  for (const double factor : factors) {
+    if (stale_) rebuildLists();
+    loss = pass_.gradients(ellipsoids_, gradients_);
+    if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
+    step(factor);
+  }
+  return loss;
 }
 
 /// Lists that miss nothing, for residuals.
@@ -80,20 +120,6 @@ std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
   options.unitVariance = unitVariance_;
   options.intensity = tuning_.seedIntensity;
   return seedsFromResidual({pass_.index(), residuals_}, options);
-}
-
-void CpuOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
-  ellipsoids_.assign(ellipsoids.begin(), ellipsoids.end());
-  states_.assign(ellipsoids_.size(), {});
-  gradients_.assign(ellipsoids_.size(), {});
-  stale_ = true;
-}
-
-void CpuOptimiser::setState(const FitState& state) {
-  setEllipsoids(state.ellipsoids);
-  states_ = state.adam;
-  listed_.clear();
-  for (const Ellipsoid& p : ellipsoids_) listed_.push_back(unlisted(p));
 }
 
 void CpuOptimiser::growTo(std::size_t count) {
@@ -129,20 +155,6 @@ void CpuOptimiser::relocate(std::size_t count) {
   }
 }
 
-double CpuOptimiser::iterateOnce(double factor) {
-  if (stale_) rebuildLists();
-  const double loss = pass_.gradients(ellipsoids_, gradients_);
-  if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
-  step(factor);
-  return loss;
-}
-
-double CpuOptimiser::iterate(std::span<const double> factors) {
-  double loss = 0.0;
-  for (const double factor : factors) loss = iterateOnce(factor);
-  return loss;
-}
-
 FitErrors CpuOptimiser::measure() {
   buildTightLists();
   pass_.residuals(ellipsoids_, residuals_);
@@ -151,17 +163,18 @@ FitErrors CpuOptimiser::measure() {
 
 double CpuOptimiser::kappaSlope() {
   double slope = 0.0;
-  const double logMByKappa = kernelWidth(pass_.kernel()).logMByKappa;
+  const double logMByKappa = kernelWidth(kernel_).logMByKappa;
   for (const EllipsoidGradient& g : gradients_) slope += edgeGradient(g, logMByKappa);
   return slope;
 }
 
 void CpuOptimiser::setKappa(float kappa) {
-  const double before = kernelWidth(pass_.kernel()).m;
+  const double before = kernelWidth(kernel_).m;
   options_.kernel.kappa = kappa;
-  pass_.setKernel(kernelConstants<double>(options_.kernel));
-  unitVariance_ = kernelMoments(pass_.kernel()).variance;
-  const double factor = std::sqrt(kernelWidth(pass_.kernel()).m / before);
+  kernel_ = kernelConstants<double>(options_.kernel);
+  pass_.setKernels(PassKernels(kernel_));
+  unitVariance_ = kernelMoments(kernel_).variance;
+  const double factor = std::sqrt(kernelWidth(kernel_).m / before);
   for (Ellipsoid& p : ellipsoids_) shrinkBy(p, factor);
   stale_ = stale_ || anyOutgrown();
 }

@@ -5,11 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "fit/adam.h"
 #include "fit/cpu/cpu_pass.h"
-#include "fit/cpu/seed.h"
 #include "fit/optimiser.h"
-#include "fit/tuning.h"
 
 namespace esvr {
 
@@ -44,11 +41,11 @@ class CpuOptimiser final : public Optimiser {
   [[nodiscard]] bool anyOutgrown() const;
   void step(double factor);
   void buildTightLists();
-  double iterateOnce(double factor);
 
   const FitTarget& target_;
   OptimiserOptions options_;
   Tuning tuning_;
+  KernelConstants<double> kernel_;
   CpuPass pass_;
   double unitVariance_;
   EllipsoidLimits limits_;

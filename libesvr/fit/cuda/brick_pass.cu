@@ -1,7 +1,7 @@
+// This file is compiled with approximate functions (CMakeLists.txt).
+
 #include "core/cuda/check.h"
 #include "fit/cuda/brick_pass.cuh"
-#include "fit/cuda/halt.h"
-#include "fit/cuda/threads_per_brick.h"
 
 namespace esvr::cuda {
 namespace {

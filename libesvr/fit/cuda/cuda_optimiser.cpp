@@ -11,15 +11,31 @@
 #include "esvr/error.h"
 #include "esvr/progress.h"
 #include "field/gather.h"
-#include "fit/cuda/least_useful.h"
-#include "fit/cuda/make_cuda_optimiser.h"
+#include "fit/cuda/make_cuda.h"
 #include "fit/cuda/memory_plan.h"
-#include "fit/cuda/place_seeds.h"
-#include "fit/kernel_moments.h"
-#include "fit/motion_bound.h"
-#include "fit/scene.h"
 
-namespace esvr::cuda {
+namespace esvr {
+
+std::unique_ptr<Optimiser> makeCudaOptimiser(const FitTarget& target,
+                                             const OptimiserOptions& options,
+                                             const Tuning& tuning) {
+  cuda::useDevice(options.device);
+  cuda::requireMemory(target, 1, options.maxDeviceBytes);
+  return std::make_unique<cuda::CudaOptimiser>(target, options, tuning);
+}
+
+std::shared_ptr<void> keepFreedMemory(const Device& device) {
+  cuda::useDevice(device);
+  return std::make_shared<cuda::KeepFreedMemory>();
+}
+
+bool fitsOnGpu(const FitSize& size, std::size_t ellipsoids, const Device& device,
+               std::optional<std::size_t> maxBytes) {
+  cuda::useDevice(device);
+  return cuda::fitsInMemory(size, ellipsoids, maxBytes);
+}
+
+namespace cuda {
 namespace {
 
 /// Seconds for which the steps that are started at once may take. A cancellation waits for them.
@@ -62,6 +78,69 @@ void CudaOptimiser::setKernel() {
   radius_ = supportRadius(kernel_);
   unitVariance_ = kernelMoments(kernel_).variance;
 }
+
+std::size_t CudaOptimiser::deviceBytes() const { return memory_.peak(); }
+
+/// Does work that allocates memory. If memory runs out, the scratch memory is freed and the work is
+/// done again.
+template <class Work>
+auto CudaOptimiser::withRoom(const Work& work) {
+  try {
+    return work();
+  } catch (const DeviceMemoryError&) {
+    releaseScratch();
+  }
+  return work();
+}
+
+/// Does the same, and drops ellipsoids until the memory suffices.
+/// \throws DeviceMemoryError  the memory does not suffice for one ellipsoid
+template <class Work>
+auto CudaOptimiser::withFewer(const Work& work) {
+  for (;;) {
+    try {
+      return withRoom(work);
+    } catch (const DeviceMemoryError&) {
+      if (count_ < 2) throw;
+      dropLeastUseful();
+    }
+  }
+}
+
+// --- The ellipsoids.
+
+std::vector<Ellipsoid> CudaOptimiser::ellipsoids() const {
+  std::vector<Ellipsoid> host(count_);
+  downloadTo(std::span<Ellipsoid>(host), ellipsoids_.data(), stream_.get());
+  return host;
+}
+
+void CudaOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
+  count_ = stepped_ = 0;
+  reserve(ellipsoids.size());
+  count_ = ellipsoids.size();
+  uploadTo(ellipsoids_.data(), ellipsoids, stream_.get());
+  const std::vector<AdamState> fresh(count_);
+  uploadTo(adam_.data(), std::span<const AdamState>(fresh), stream_.get());
+  writeForms();
+  stale_ = true;
+}
+
+void CudaOptimiser::setState(const FitState& state) {
+  setEllipsoids(state.ellipsoids);
+  uploadTo(adam_.data(), std::span<const AdamState>(state.adam), stream_.get());
+  std::vector<ListedSupport> listed;
+  for (const Ellipsoid& p : state.ellipsoids) listed.push_back(unlisted(p));
+  uploadTo(listed_.data(), std::span<const ListedSupport>(listed), stream_.get());
+}
+
+FitState CudaOptimiser::state() const {
+  FitState state{ellipsoids(), std::vector<AdamState>(count_)};
+  downloadTo(std::span(state.adam), adam_.data(), stream_.get());
+  return state;
+}
+
+// --- Passes and steps.
 
 BrickPassArguments CudaOptimiser::passArguments() {
   return {.scene = passScene(bricks_, lists_, count_, forms_.data()),
@@ -162,42 +241,6 @@ void CudaOptimiser::writeResiduals() {
   launchResiduals(pass, stream_.get());
 }
 
-std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
-                                      const std::uint32_t* into) {
-  if (stale_) buildTightLists();
-  stale_ = true;  // the caller adds or moves ellipsoids
-  writeResiduals();
-  sumLoss();
-  const double loss = downloadValue(&status_.data()->loss, stream_.get());
-  const DeviceSampling drawn = sampling_.draw(
-      residual_.data(), loss, bricks_.view().bricks,
-      {count, target_.seedBricks, signsOf(target_), options_.seed ^ (++samplings_ << 32)});
-  launchPlaceSeeds({.voxels = drawn.voxels,
-                    .count = drawn.count,
-                    .bricks = bricks_.view(),
-                    .residual = residual_.data(),
-                    .window = seedWindow(target_, ellipsoids, tuning_),
-                    .unitVariance = unitVariance_,
-                    .intensity = tuning_.seedIntensity,
-                    .share = drawn.share,
-                    .into = into,
-                    .firstPlace = std::uint32_t(count_),
-                    .ellipsoids = ellipsoids_.data(),
-                    .states = adam_.data()},
-                   stream_.get());
-  return drawn.count;
-}
-
-void CudaOptimiser::relocate(std::size_t count) {
-  const AddSeconds timer(secondsSeeding_);
-  withFewer([&] {
-    const auto chosen = ranking_.leastUseful(stepArguments(0.0, 0), count, tuning_.graceSteps);
-    if (chosen.count == 0) return;
-    placeSeeds(chosen.count, count_, chosen.places);
-    writeForms();
-  });
-}
-
 void CudaOptimiser::sumLoss() {
   launchLossSum(brickLoss_.data(), std::uint32_t(bricks_.size()), &status_.data()->loss,
                 stream_.get());
@@ -226,6 +269,23 @@ std::size_t CudaOptimiser::look(std::size_t started) {
   stale_ = !status.canGoOn(started);
   ahead_ = std::min(stale_ ? served_ : 2 * ahead_, StepStatus::kMaxAhead);
   return taken;
+}
+
+void ThreadsPerBrick::listsChanged(std::size_t passes) {
+  constexpr std::size_t kPassesServed = 160;  // a measurement costs two slower passes
+  tried_ = int(std::min(std::size_t(tried_), std::size_t(triedBefore_) + passes));
+  triedBefore_ = tried_;
+  if (tried_ != kChoices) return;
+  if (measuring_) {
+    std::array<double, kChoices> times{};
+    for (int k = 0; k < kChoices; ++k)
+      times[std::size_t(k)] =
+          trials_[std::size_t(k)].end.millisecondsSince(trials_[std::size_t(k)].begin);
+    best_ = int(std::min_element(times.begin(), times.end()) - times.begin());
+  }
+  served_ = measuring_ ? 0 : served_ + passes;
+  measuring_ = served_ >= kPassesServed;
+  if (measuring_) tried_ = triedBefore_ = 0;
 }
 
 double CudaOptimiser::iterate(std::span<const double> factors) {
@@ -279,4 +339,149 @@ FitErrors CudaOptimiser::measure() {
   });
 }
 
-}  // namespace esvr::cuda
+std::vector<EllipsoidGradient> CudaOptimiser::gradients(int threads) {
+  rebuildLists();
+  launchGradients(passArguments(), threads, stream_.get());
+  launchMomentSums(momentSums(), stream_.get());
+  DeviceBuffer<EllipsoidGradient> out(count_, stream_.get());
+  launchReadGradients(stepArguments(0.0, 0), out.data(), stream_.get());
+  std::vector<EllipsoidGradient> host(count_);
+  out.download(host);
+  return host;
+}
+
+void CudaOptimiser::dropUnseen() {
+  if (count_ == 0) return;
+  setEllipsoids(withFewer([&] {
+    const auto all = ellipsoids();
+    const auto gradient = gradients();
+    std::vector<Ellipsoid> seen;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (gradient[i].phi2 > 0.0 && all[i].intensity != 0.0) seen.push_back(all[i]);
+    return seen;
+  }));
+}
+
+// --- Growth and relocation.
+
+void CudaOptimiser::reserve(std::size_t ellipsoids) {
+  (void)count32(ellipsoids, "ellipsoids");
+  ellipsoids_.extend(ellipsoids, count_);
+  adam_.extend(ellipsoids, count_);
+  forms_.extend(ellipsoids, count_);
+  usefulness_.extend(ellipsoids, count_);
+  listed_.extend(ellipsoids, count_);
+}
+
+std::size_t CudaOptimiser::placeSeeds(std::size_t count, std::size_t ellipsoids,
+                                      const std::uint32_t* into) {
+  if (stale_) buildTightLists();
+  stale_ = true;  // the caller adds or moves ellipsoids
+  writeResiduals();
+  sumLoss();
+  const double loss = downloadValue(&status_.data()->loss, stream_.get());
+  const DeviceSampling drawn = sampling_.draw(
+      residual_.data(), loss, bricks_.view().bricks,
+      {count, target_.seedBricks, signsOf(target_), options_.seed ^ (++samplings_ << 32)});
+  launchPlaceSeeds({.voxels = drawn.voxels,
+                    .count = drawn.count,
+                    .bricks = bricks_.view(),
+                    .residual = residual_.data(),
+                    .window = seedWindow(target_, ellipsoids, tuning_),
+                    .unitVariance = unitVariance_,
+                    .intensity = tuning_.seedIntensity,
+                    .share = drawn.share,
+                    .into = into,
+                    .firstPlace = std::uint32_t(count_),
+                    .ellipsoids = ellipsoids_.data(),
+                    .states = adam_.data()},
+                   stream_.get());
+  return drawn.count;
+}
+
+void CudaOptimiser::relocate(std::size_t count) {
+  const AddSeconds timer(secondsSeeding_);
+  withFewer([&] {
+    const auto chosen = ranking_.leastUseful(stepArguments(0.0, 0), count, tuning_.graceSteps);
+    if (chosen.count == 0) return;
+    placeSeeds(chosen.count, count_, chosen.places);
+    writeForms();
+  });
+}
+
+void CudaOptimiser::grow(std::size_t count) {
+  reserve(count);
+  count_ += placeSeeds(count - count_, std::max(count - count_, count_), nullptr);
+  writeForms();
+}
+
+void CudaOptimiser::growTo(std::size_t count) {
+  if (count <= count_ || full_) return;
+  const AddSeconds timer(secondsSeeding_);
+  if (count_ == 0) requireMemory(target_, count, options_.maxDeviceBytes);
+  const std::size_t affordable = affordableEllipsoids(target_, count, options_.maxDeviceBytes);
+  full_ = affordable < count;
+  if (affordable <= count_) return;
+  try {
+    withRoom([&] { grow(affordable); });
+  } catch (const DeviceMemoryError&) {
+    if (count_ == 0) throw;
+    releaseScratch();
+    std::vector<std::size_t> all(count_);
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    keep(all);  // frees the memory that was reserved for the growth
+  }
+}
+
+// --- When memory runs out.
+
+/// Frees all memory whose contents can be computed again.
+void CudaOptimiser::releaseScratch() {
+  full_ = stale_ = true;
+  lists_ = PairLists(stream_.get());
+  sampling_ = VoxelSampling(stream_.get());
+  ranking_ = EllipsoidRanking(stream_.get());
+  errorSums_ = ErrorSums(stream_.get());
+  for (auto* buffer : {&moments_, &residual_}) buffer->release();
+  for (auto* buffer : {&brickLoss_, &chunkSums_}) buffer->release();
+  trimMemoryPool();
+}
+
+/// Keeps the ellipsoids at these places, which must increase, together with their states, and frees
+/// the memory of the others.
+void CudaOptimiser::keep(std::span<const std::size_t> places) {
+  const auto gather = [&]<class T>(GrowingBuffer<T>& buffer) {
+    std::vector<T> all(count_), kept;
+    downloadTo(std::span<T>(all), buffer.data(), stream_.get());
+    for (const std::size_t i : places) kept.push_back(all[i]);
+    buffer.release();
+    uploadTo(buffer.reserve(kept.size()), std::span<const T>(kept), stream_.get());
+  };
+  gather(ellipsoids_);
+  gather(adam_);
+  gather(usefulness_);
+  gather(listed_);
+  forms_.release();
+  forms_.reserve(places.size());
+  stepped_ = std::size_t(std::lower_bound(places.begin(), places.end(), stepped_) - places.begin());
+  count_ = places.size();
+  writeForms();
+  stale_ = true;
+}
+
+/// Drops the tenth of the ellipsoids whose removal adds the smallest error. New ellipsoids, which
+/// have not taken a step yet, are dropped first.
+void CudaOptimiser::dropLeastUseful() {
+  constexpr std::size_t kShare = 10;
+  const auto all = ellipsoids();
+  std::vector<Usefulness> usefulness(stepped_);
+  downloadTo(std::span(usefulness), usefulness_.data(), stream_.get());
+  std::vector<double> worth(count_, 0.0);
+  for (std::size_t i = 0; i < stepped_; ++i)
+    worth[i] =
+        removalError(all[i].intensity, double(usefulness[i].phi2), double(usefulness[i].rPhi));
+  keep(allButLowest(worth, count_ / kShare + 1));
+}
+
+}  // namespace cuda
+}  // namespace esvr

@@ -1,7 +1,6 @@
 #pragma once
 /// The optimiser on a GPU. It decides the order of the operations; their kernels are in the other
-/// files of this folder. Its parts: iterations (cuda_optimiser.cpp), growth and what happens when
-/// memory runs out (cuda_optimiser_memory.cpp), and its state (cuda_optimiser_state.cpp).
+/// files of this folder.
 
 #include <optional>
 #include <span>
@@ -10,14 +9,9 @@
 #include "core/cuda/memory_pool.h"
 #include "core/cuda/stream.h"
 #include "fit/cuda/brick_pass.h"
-#include "fit/cuda/brick_table.h"
-#include "fit/cuda/error_sums.h"
-#include "fit/cuda/pair_lists.h"
-#include "fit/cuda/rank_ellipsoids.h"
-#include "fit/cuda/sample_voxels.h"
+#include "fit/cuda/lists.h"
+#include "fit/cuda/relocation.h"
 #include "fit/cuda/step.h"
-#include "fit/cuda/step_status.h"
-#include "fit/cuda/threads_per_brick.h"
 #include "fit/optimiser.h"
 
 namespace esvr::cuda {
@@ -63,7 +57,6 @@ class CudaOptimiser final : public Optimiser {
   void sumLoss();
   void reserve(std::size_t ellipsoids);
   void grow(std::size_t count);
-  [[nodiscard]] std::vector<Ellipsoid> seenEllipsoids();
 
   void releaseScratch();
   void keep(std::span<const std::size_t> places);
@@ -113,31 +106,5 @@ class CudaOptimiser final : public Optimiser {
   std::size_t ahead_ = 8;        ///< steps to start before the next look()
   bool full_ = false;            ///< memory ran out, so no more ellipsoids are added
 };
-
-/// Does work that allocates memory. If memory runs out, the scratch memory is freed and the work is
-/// done again.
-template <class Work>
-auto CudaOptimiser::withRoom(const Work& work) {
-  try {
-    return work();
-  } catch (const DeviceMemoryError&) {
-    releaseScratch();
-  }
-  return work();
-}
-
-/// Does the same, and drops ellipsoids until the memory suffices.
-/// \throws DeviceMemoryError  the memory does not suffice for one ellipsoid
-template <class Work>
-auto CudaOptimiser::withFewer(const Work& work) {
-  for (;;) {
-    try {
-      return withRoom(work);
-    } catch (const DeviceMemoryError&) {
-      if (count_ < 2) throw;
-      dropLeastUseful();
-    }
-  }
-}
 
 }  // namespace esvr::cuda

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <string>
 
 #include "core/cuda/memory_pool.h"
 #include "esvr/error.h"
-#include "fit/cuda/brick_pass.h"
-#include "fit/cuda/brick_table_view.h"
 #include "fit/cuda/step.h"
 
 namespace esvr::cuda {
@@ -98,6 +97,16 @@ bool fitsInMemory(const FitTarget& target, std::optional<std::size_t> maxBytes) 
 bool fitsInMemory(const FitSize& size, std::size_t ellipsoids,
                   std::optional<std::size_t> maxBytes) {
   return bytesOf(size, double(ellipsoids)) <= double(maxBytes ? *maxBytes : availableMemory());
+}
+
+std::vector<std::size_t> allButLowest(std::span<const double> values, std::size_t dropped) {
+  std::vector<std::size_t> places(values.size());
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  std::stable_sort(places.begin(), places.end(),
+                   [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  places.erase(places.begin(), places.begin() + std::ptrdiff_t(std::min(dropped, places.size())));
+  std::sort(places.begin(), places.end());
+  return places;
 }
 
 }  // namespace esvr::cuda

@@ -1,10 +1,12 @@
 #pragma once
-/// Predicts the device memory of a fit before it is allocated.
+/// Predicts the device memory of a fit before it is allocated, and chooses what is kept when it
+/// runs out.
 
 #include <cstddef>
 #include <optional>
+#include <span>
+#include <vector>
 
-#include "fit/fit_size.h"
 #include "fit/target.h"
 
 namespace esvr::cuda {
@@ -30,5 +32,10 @@ void requireMemory(const FitTarget& target, std::size_t ellipsoids,
 /// True if a fit of this size with this number of ellipsoids, at least 1, stays within the memory.
 [[nodiscard]] bool fitsInMemory(const FitSize& size, std::size_t ellipsoids,
                                 std::optional<std::size_t> maxBytes);
+
+/// \return the places of all values but the `dropped` lowest ones, in increasing order. If values
+///         are equal, the first ones are dropped.
+[[nodiscard]] std::vector<std::size_t> allButLowest(std::span<const double> values,
+                                                    std::size_t dropped);
 
 }  // namespace esvr::cuda

@@ -1,6 +1,5 @@
 #include "core/refuse_cuda.h"
-#include "fit/cuda/make_cuda_intensity_passes.h"
-#include "fit/cuda/make_cuda_optimiser.h"
+#include "fit/cuda/make_cuda.h"
 
 namespace esvr {
 
@@ -18,6 +17,11 @@ bool fitsOnGpu(const FitSize&, std::size_t, const Device& device, std::optional<
 std::unique_ptr<IntensityPasses> makeCudaIntensityPasses(const IntensityTarget&,
                                                          const Device& device) {
   refuseCuda("fitting", device);
+}
+
+std::unique_ptr<paper::PaperOptimiser> makeCudaPaperOptimiser(const FitTarget&,
+                                                              const paper::PaperOptions& options) {
+  refuseCuda("fitting", options.device);
 }
 
 }  // namespace esvr

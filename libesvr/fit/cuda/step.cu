@@ -1,15 +1,35 @@
 #include "fit/cuda/step.h"
 
-#include "core/cuda/check.h"
+#include <array>
+#include <cub/device/device_reduce.cuh>
+
+#include "core/cuda/copy.h"
+#include "core/cuda/launch.h"
 #include "core/cuda/reduce.cuh"
-#include "fit/adam_math.h"
-#include "fit/cuda/halt.h"
-#include "fit/cuda/moment_sums.cuh"
-#include "fit/motion_bound.h"
-#include "fit/parameter_gradient.h"
+#include "core/cuda/temporary.h"
+#include "core/cuda/thread_number.cuh"
 
 namespace esvr::cuda {
 namespace {
+
+constexpr int kLanes = 16;  // lanes of a chunk: kMoments, rounded up to a power of two
+static_assert(kLanes >= kMoments);
+
+/// Each lane sums one moment over the pairs of a chunk, which lie next to each other in memory.
+__global__ void sumChunks(const MomentSums a) {
+  const std::size_t thread = threadNumber();
+  const std::size_t chunk = thread / kLanes, lane = thread % kLanes;
+  if (chunk >= a.chunkCount || lane >= kMoments || isHalted(a.halted)) return;
+  const std::uint32_t i = a.lists.chunkOwner[chunk];
+  const std::uint32_t begin = a.lists.ellipsoidBegin[i] +
+                              std::uint32_t(chunk - a.lists.chunkBegin[i]) * PairListsView::kChunk;
+  const std::uint32_t end = min(a.lists.ellipsoidBegin[i + 1], begin + PairListsView::kChunk);
+  double sum = 0.0;
+#pragma unroll 4
+  for (std::uint32_t k = begin; k < end; ++k)
+    sum += double(a.moments[std::size_t(k) * kMoments + lane]);
+  a.chunkSums[chunk * kMoments + lane] = sum;
+}
 
 constexpr int kStepBlock = 64;  // small blocks spread few ellipsoids over many multiprocessors
 constexpr int kSumBlock = 1024;
@@ -87,7 +107,34 @@ __global__ void __launch_bounds__(kStepBlock) shrink(const ShrinkArguments a) {
   if (a.listed != nullptr && !isHeld(a.listed[i], a.ellipsoids[i], a.core)) *a.halts = 1;
 }
 
+constexpr int kColumns = 4;  // members of FitErrors, in its order
+
+/// Each warp sums one brick. Column c of brick b is written to out[c * brickCount + b].
+__global__ void brickErrors(const ErrorArguments a, double* out) {
+  const std::size_t b = warpNumber();
+  if (b >= a.brickCount) return;
+  const Coord corner = a.bricks[b] * kBrickSide;
+  double all = 0.0, box = 0.0, active = 0.0, largest = 0.0;
+  for (int v = int(threadIdx.x % kWarp); v < kBrickVoxels; v += kWarp) {
+    const double r = double(a.residual[b * kBrickVoxels + v]);
+    all += r * r;
+    if (a.box.contains(corner + voxelLocal(v))) box += r * r;
+    if (b < a.targetCount && a.active[b].test(v)) active += r * r;
+    largest = fmax(largest, fabs(r));
+  }
+  all = warpSum(all), box = warpSum(box), active = warpSum(active), largest = warpMax(largest);
+  if (threadIdx.x % kWarp != 0) return;
+  const std::size_t n = a.brickCount;
+  out[b] = all, out[n + b] = box, out[2 * n + b] = active, out[3 * n + b] = largest;
+}
+
 }  // namespace
+
+void launchMomentSums(const MomentSums& sums, cudaStream_t stream) {
+  if (sums.chunkCount == 0) return;
+  sumChunks<<<blocksFor(std::size_t(sums.chunkCount) * kLanes, kBlock), kBlock, 0, stream>>>(sums);
+  check(cudaGetLastError(), "starting the sums of moments");
+}
 
 void launchStep(const StepArguments& a, cudaStream_t stream) {
   if (a.ellipsoidCount == 0) return;
@@ -129,6 +176,27 @@ void launchForms(const FormArguments& a, cudaStream_t stream) {
   if (a.count == 0) return;
   writeForms<<<blocksFor(a.count, kStepBlock), kStepBlock, 0, stream>>>(a);
   check(cudaGetLastError(), "starting to prepare ellipsoids");
+}
+
+ErrorSums::ErrorSums(cudaStream_t stream)
+    : stream_(stream), columns_(stream), totals_(stream), temporary_(stream) {}
+
+FitErrors ErrorSums::sum(const ErrorArguments& a) {
+  const std::size_t n = a.brickCount;
+  double* const columns = columns_.reserve(kColumns * n);
+  double* const totals = totals_.reserve(kColumns);
+  brickErrors<<<blocksFor(n * kWarp, kBlock), kBlock, 0, stream_>>>(a, columns);
+  check(cudaGetLastError(), "summing errors");
+  // On one kind of device, CUB reduces doubles in the same order in every run.
+  for (int c = 0; c < kColumns; ++c)
+    withTemporary(temporary_, "summing errors", [&](void* memory, std::size_t& bytes) {
+      if (c == kColumns - 1)
+        return cub::DeviceReduce::Max(memory, bytes, columns + c * n, totals + c, n, stream_);
+      return cub::DeviceReduce::Sum(memory, bytes, columns + c * n, totals + c, n, stream_);
+    });
+  std::array<double, kColumns> values{};
+  downloadTo(std::span<double>(values), totals, stream_);
+  return {values[0], values[1], values[2], values[3]};
 }
 
 }  // namespace esvr::cuda

@@ -2,12 +2,13 @@
 /// The paper's loss, beta * L1 + (1 - beta) * D-SSIM (paper, eq. 7), and its derivative by every
 /// voxel of the prediction. D-SSIM is 1 - mean 3D SSIM with the window of ssim_window.h.
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "core/brick_index.h"
-#include "fit/paper/ssim_gradient.h"
+#include "field/ssim_window.h"
 
 namespace esvr {
 
@@ -21,6 +22,37 @@ struct PaperLossInput {
   double beta;                      ///< share of L1 in the loss, 0 to 1
   double peak;                      ///< range L of the values, by which they are divided for L1
   std::optional<Box> within{};      ///< box of bricks whose voxels' windows count; default: all
+};
+
+/// Derivatives of 1 - SSIM by the windows' weighted means of r, r r and t r, for the windows around
+/// a brick's voxels. They are zero for windows that cover neither r nor t. The last two are
+/// multiplied by c2, so that they are of order 1 at most. The first is float64, because its sum
+/// over the windows of a flat region nearly cancels that of the second.
+///
+/// With means m, variances v and the prediction p = t + r,
+///
+///     SSIM = (1 - l) (1 - c),   l = m_r^2 / (m_p^2 + m_t^2 + c1),   c = v_r / (v_p + v_t + c2)
+///
+/// This form in the residual r has no cancellation for good fits.
+struct WindowGradients {
+  std::array<double, kBrickVoxels> byR;
+  std::array<float, kBrickVoxels> byRr, byTr;
+};
+
+/// The values that SSIM compares.
+struct SsimValues {
+  const BrickIndex& index;
+  std::span<const float> residual;  ///< kBrickVoxels values for each brick of the index
+  std::span<const float> target;    ///< target in the index's first bricks; it is zero in others
+  SsimConstants constants;
+};
+
+/// The windows that cover a residual or a target, by brick.
+struct Windows {
+  BrickIndex index;
+  std::vector<Box> supports;  ///< boxes, halo coordinates, outside which r and t are zero
+  std::vector<Box> reached;   ///< voxels whose windows overlap `supports`, in whole rows along z
+  std::vector<WindowGradients> gradients;
 };
 
 /// Evaluates the loss. The time is proportional to the number of bricks and their neighbours:

@@ -1,6 +1,6 @@
 #pragma once
-/// The interface of the paper's method on any device: the state of a run and its iteration.
-/// paper_run.h decides the order of the operations.
+/// The paper's method on any device: the subvolumes, which are cubes, the state of a run and its
+/// iteration. fit_paper.cpp decides the order of the operations.
 
 #include <cstddef>
 #include <memory>
@@ -9,10 +9,35 @@
 
 #include "esvr/device.h"
 #include "fit/optimiser.h"
-#include "fit/paper/paper_math.h"
-#include "fit/paper/subvolumes.h"
+#include "fit/paper/paper_ellipsoid.h"
+#include "fit/target.h"
 
 namespace esvr::paper {
+
+/// The volume that is divided: whole bricks around the target's box and bricks.
+struct Space {
+  Box bricks;
+  [[nodiscard]] int longestAxis() const;   ///< voxels
+  [[nodiscard]] int shortestAxis() const;  ///< voxels
+  [[nodiscard]] Box voxels() const;
+};
+[[nodiscard]] Space spaceOf(const FitTarget& target);
+
+/// The side of the subvolumes, which is a multiple of 8 voxels.
+/// \param asked  wanted side in voxels; 0: half the longest axis, or the shortest axis if that is
+///               less (paper, appendix 'Subvolume configuration')
+[[nodiscard]] int subvolumeSide(const Space& space, int asked);
+
+/// A subvolume: its part of the target, whose `within` is the box of the subvolume.
+struct Subvolume {
+  FitTarget target;
+  std::vector<BrickMask> active;
+};
+
+/// Divides a target into subvolumes in the order of their coordinates, including those without
+/// target bricks. They are allocated one by one, because each target points to its masks.
+[[nodiscard]] std::vector<std::unique_ptr<Subvolume>> cutSubvolumes(const FitTarget& target,
+                                                                    const Space& space, int side);
 
 struct PaperOptions {
   KernelKind kind;

@@ -1,12 +1,13 @@
-#include "fit/paper/ray_scores.h"
+// Scores of ellipsoids by the rays of pictures, as LightGaussian (Fan et al. 2024) has them.
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <numeric>
 
 #include "core/parallel.h"
-#include "fit/paper/paper_math.h"
+#include "fit/paper/population.h"
 
 namespace esvr::paper {
 namespace {
@@ -16,7 +17,7 @@ using Vector = std::array<double, 3>;
 /// The limits of opacities of 3D Gaussian Splatting.
 constexpr double kLeastOpacity = 1.0 / 255, kMostOpacity = 0.99;
 /// Number of sums that are formed at the same time and then added in order.
-constexpr int kParts = 16;
+constexpr int kPartialSums = 16;
 
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
@@ -151,17 +152,17 @@ double cornerRadius(const Box& box) {
 std::vector<double> rayContributions(std::span<const PaperEllipsoid> ellipsoids,
                                      const CoverageOptions& options, int views) {
   const std::vector<Seen> seen = seenFrom(ellipsoids, options);
-  std::vector<std::vector<double>> parts(kParts, std::vector<double>(seen.size()));
-  parallelFor(0, kParts, [&](int part) {
+  std::vector<std::vector<double>> parts(kPartialSums, std::vector<double>(seen.size()));
+  parallelFor(0, kPartialSums, [&](int part) {
     Picture picture(cornerRadius(options.box));
-    for (int k = part; k < views; k += kParts) {
+    for (int k = part; k < views; k += kPartialSums) {
       const View view = viewOf(k, views);
       picture.clear();
       for (const std::size_t i : fromFrontToBack(seen, view))
         parts[part][i] += picture.draw(seen[i], ellipseOf(seen[i], view));
     }
   });
-  for (int part = 1; part < kParts; ++part)
+  for (int part = 1; part < kPartialSums; ++part)
     std::ranges::transform(parts[0], parts[part], parts[0].begin(), std::plus());
   return parts[0];
 }

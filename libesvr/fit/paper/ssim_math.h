@@ -1,5 +1,5 @@
 #pragma once
-/// 1 - SSIM of one window and its derivatives (ssim_gradient.h), for host and device.
+/// 1 - SSIM of one window and its derivatives (paper_loss.h), for host and device.
 
 #include "esvr/kernel.h"
 #include "field/ssim_window.h"

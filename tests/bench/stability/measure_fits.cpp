@@ -6,8 +6,7 @@
 
 #include "esvr/error.h"
 #include "esvr/fit.h"
-#include "fit/fit_plan.h"
-#include "fit/import_field.h"
+#include "fit/ellipsoid.h"
 #include "fit/run.h"
 
 namespace esvr::bench {
@@ -72,7 +71,7 @@ class Fits {
     const auto optimiser = makeOptimiser(target_, optimiserOptions, tuning);
     try {
       result.iterations = run(*optimiser, target_, recorder, plan(tuning), tuning).iterations;
-      recorder.record(*optimiser, result.iterations);
+      recorder.record(optimiser->measure(), optimiser->ellipsoidCount(), result.iterations);
     } catch (const RuntimeFailure& failure) {
       result.failure = failure.what();
     }

@@ -1,4 +1,4 @@
-// Measures the cases of docs/stability.md on one device, and writes the figures as JSON:
+// Measures the cases of docs/figures/stability.md on one device, and writes the figures as JSON:
 //
 //     bench_stability OUT.json [--device cpu|cuda|cuda:N] [--machine TEXT] [--iterations N] [--only TEXT]
 //

@@ -1,5 +1,5 @@
 #pragma once
-/// The stiff and extreme cases of docs/stability.md.
+/// The stiff and extreme cases of docs/figures/stability.md.
 
 #include <cstdint>
 #include <functional>

@@ -8,8 +8,7 @@
 #include "core/cuda/copy.h"
 #include "core/cuda/device_buffer.h"
 #include "core/cuda/stream.h"
-#include "fit/cuda/brick_table.h"
-#include "fit/cuda/pair_lists.h"
+#include "fit/cuda/lists.h"
 #include "gpu_test.h"
 
 namespace esvr::cuda {

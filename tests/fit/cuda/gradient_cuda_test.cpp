@@ -1,15 +1,16 @@
 // Plan: gradients, loss and curvature of the GPU agree with those of the CPU, which other tests
 // compare with float64 differences. The cases are kernels from soft to hard, thin ellipsoids,
 // ellipsoids that cover everything, narrow bands, bricks that only supports reach, and many
-// ellipsoids in one brick.
+// ellipsoids in one brick. For the shapes and kernels of the CPU's tests (gradient_test.cpp), the
+// gradients are compared with float64 differences and the adjoint identity.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "../gradient_cases.h"
 #include "../random_ellipsoids.h"
-#include "../reference_sum.h"
 #include "../volumes.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/cuda/cuda_optimiser.h"
@@ -160,6 +161,34 @@ TEST_P(SaturationOnGpu, IsThatOfTheCpuWithConstants) {
   for (float& v : target.constants) v = float(random(-0.5, 0.5));
   expectAgreement({volume, target, {.kappa = 2.0f}, test::randomEllipsoids(100, 1.0, 3.0)}, 1e-4);
 }
+
+class GradientCasesOnGpu : public test::CudaTest,
+                           public testing::WithParamInterface<test::GradientCase> {
+ protected:
+  [[nodiscard]] std::vector<EllipsoidGradient> gradients() const {
+    OptimiserOptions options;
+    options.kernel = {.kappa = GetParam().kappa};
+    cuda::CudaOptimiser onGpu(target_.get(), options, {});
+    onGpu.setEllipsoids(ellipsoids_);
+    return onGpu.gradients();
+  }
+
+  const test::SmallTarget target_;
+  const std::vector<Ellipsoid> ellipsoids_ = test::ellipsoidsOf(GetParam(), target_);
+};
+
+TEST_P(GradientCasesOnGpu, AgreeWithDifferences) {
+  const auto g = test::residualsOf(target_, GetParam(), ellipsoids_);
+  test::expectDifferences(target_, GetParam(), ellipsoids_, g, gradients());
+}
+
+TEST_P(GradientCasesOnGpu, SatisfyTheAdjointIdentity) {
+  const auto g = test::residualsOf(target_, GetParam(), ellipsoids_);
+  test::expectAdjointIdentity(target_, GetParam(), ellipsoids_, g, gradients());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, GradientCasesOnGpu, testing::ValuesIn(test::gradientCases()),
+                         [](const auto& c) { return test::nameOf(c.param); });
 
 }  // namespace
 }  // namespace esvr

@@ -17,7 +17,6 @@
 #include "core/cuda/memory_pool.h"
 #include "esvr/convert.h"
 #include "fit/cuda/cuda_optimiser.h"
-#include "fit/cuda/least_useful.h"
 #include "fit/cuda/memory_plan.h"
 #include "gpu_test.h"
 

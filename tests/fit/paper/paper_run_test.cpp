@@ -13,8 +13,8 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/paper_method.h"
-#include "fit/paper/initial_points.h"
-#include "fit/paper/subvolumes.h"
+#include "fit/paper/paper_optimiser.h"
+#include "fit/paper/population.h"
 #include "support/on_device.h"
 
 namespace esvr::paper {
