@@ -7,8 +7,7 @@
 
 #include "capi/objects.h"
 #include "page/page.h"
-#include "render/brick_atlas.h"
-#include "render/voxel_levels.h"
+#include "render/cell_bricks.h"
 
 namespace esvr::page {
 namespace {

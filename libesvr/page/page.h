@@ -58,8 +58,8 @@ struct page_transfer {
   const double* opacity;  ///< value, opacity, midpoint, sharpness
 };
 
-/// The tables of the library's renderers (render/transfer_table.h, render/segment_table.h). Places
-/// count intervals from the lowest value of the transfer function.
+/// The tables of the library's renderers (render/transfer_table.h). Places count
+/// intervals from the lowest value of the transfer function.
 struct page_tables {
   int intervals;
   float low, scale;             ///< lowest value and intervals per unit; scale 0: no extent

@@ -4,7 +4,7 @@
 
 #include "capi/objects.h"
 #include "page/page.h"
-#include "render/shading.h"
+#include "render/sample_rule.h"
 #include "render/transfer_table.h"
 
 namespace esvr::page {

@@ -1,15 +1,19 @@
 #pragma once
-/// Marches a ray through bricks of cells. A brick holds all voxels at the corners of its cells, so
-/// that the interpolation of a sample reads one brick only. A ray crosses an empty brick, or an
-/// empty block of bricks, in one step. A ray that meets a brick whose voxels are not there stops,
-/// and can continue later. The code is compiled for host and device.
+/// Marches a ray through bricks of cells and their levels of detail. A brick holds all voxels at
+/// the corners of its cells, so that the interpolation of a sample reads one brick only. A ray
+/// crosses an empty brick, or an empty block of bricks, in one step. A ray that meets a brick whose
+/// voxels are not there stops, and can continue later. Where a pixel is wider than a voxel, a ray
+/// is sampled in a coarser level and at longer steps. The code is compiled for host and device.
 
+#include <array>
 #include <bit>
 #include <cstdint>
 
-#include "render/march_scene.h"
+#include "render/sample_rule.h"
 
 namespace esvr {
+
+// Bricks.
 
 /// A brick has 8 x 8 x 8 cells and stores the 9 x 9 x 9 voxels at their corners, z fastest.
 inline constexpr int kCellBrickSide = kBrickSide + 1;
@@ -143,6 +147,8 @@ ESVR_HD inline bool inside(const BrickTableView& a, const Coord& v) {
 
 }  // namespace brick_march
 
+// The march through the bricks of one level.
+
 /// A ray whose first samples have been added.
 struct RayProgress {
   RayState ray;
@@ -150,6 +156,42 @@ struct RayProgress {
   int level = 0;  ///< place of that sample's level in a LevelScene
   Shade shade;    ///< at the last sample that was added; used if the scene is shaded
 };
+
+/// What a RayProgress has besides the channels of its pixel and its shade, in few bytes. A ray that
+/// waits for bricks keeps its color and its transmittance in its pixel, which is written when the
+/// ray ends. Of the last sample that was added, only its value matters, and whether it is the one
+/// before the next sample.
+struct KeptRay {
+  enum class Last : std::uint8_t { kNone, kBefore, kEarlier };
+
+  float lastValue;
+  int next;  ///< below 0: the ray has ended
+  std::uint8_t level;
+  Last last;
+
+  [[nodiscard]] ESVR_HD static KeptRay ended() { return {0.0f, -1, 0, Last::kNone}; }
+  ESVR_HD static KeptRay of(const RayProgress& at) {
+    const bool isBefore = at.ray.last == std::uint32_t(at.next) - 1;
+    const Last last =
+        at.ray.last == RayState::kNone ? Last::kNone : (isBefore ? Last::kBefore : Last::kEarlier);
+    return {at.ray.lastValue, at.next, std::uint8_t(at.level), last};
+  }
+  /// \param channels  channelsOf() the ray
+  [[nodiscard]] ESVR_HD RayProgress progress(const PixelColor& channels) const {
+    RayProgress at;
+    at.ray.r = channels.r, at.ray.g = channels.g, at.ray.b = channels.b;
+    at.ray.transmittance = channels.alpha;
+    at.ray.lastValue = lastValue;
+    at.ray.last = last == Last::kNone ? RayState::kNone
+                                      : std::uint32_t(next) - (last == Last::kBefore ? 1u : 2u);
+    at.next = next, at.level = level;
+    return at;
+  }
+};
+/// What the pixel of a ray that waits holds.
+ESVR_HD inline PixelColor channelsOf(const RayProgress& at) {
+  return {at.ray.r, at.ray.g, at.ray.b, at.ray.transmittance};
+}
 
 /// The visitor of a march whose bricks all have slots or are vacant.
 struct AllBricksAreThere {
@@ -220,7 +262,7 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
       }
     }
     if (values == nullptr) {
-      i += march::samplesToLeave(place, samples.perVoxel, found.low, found.side);
+      i += samplesToLeave(place, samples.perVoxel, found.low, found.side);
       continue;
     }
     const float value = interpolate(values, place, cell);
@@ -229,6 +271,185 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
     ++i;
   }
   return !looksAhead;
+}
+
+// Levels of detail. A voxel of level l is the mean of the 2^l x 2^l x 2^l voxels from 2^l (i, j, k)
+// on, and lies in the middle of them.
+
+/// Levels 0 to kLevels - 1. Pixels that are wider than a voxel of the coarsest level use it too.
+inline constexpr int kLevels = 8;
+
+/// The mean of two values. Neither a value nor its mean with itself overflows or is rounded.
+ESVR_HD inline float meanOf(float a, float b) { return 0.5f * a + 0.5f * b; }
+
+/// The mean of eight voxels by the numbers of their corners (core/cell_corner.h). All code that
+/// averages uses it, level after level, so that voxels have the same bits however they were made.
+ESVR_HD inline float meanOf(const float (&v)[8]) {
+  return meanOf(meanOf(meanOf(v[0], v[1]), meanOf(v[2], v[3])),
+                meanOf(meanOf(v[4], v[5]), meanOf(v[6], v[7])));
+}
+
+/// The voxels of a level in units of those of level 0.
+struct LevelFrame {
+  int level;
+
+  [[nodiscard]] ESVR_HD double side() const { return double(1 << level); }
+  /// Place of voxel (0, 0, 0) along each axis.
+  [[nodiscard]] ESVR_HD double offset() const { return 0.5 * (side() - 1.0); }
+  /// Converts a place to the index space of the level.
+  [[nodiscard]] ESVR_HD Vec3 place(const Vec3& p) const {
+    const double perSide = 1.0 / side(), o = offset();
+    return {(p[0] - o) * perSide, (p[1] - o) * perSide, (p[2] - o) * perSide};
+  }
+};
+
+/// The view, clip box and rule of a scene in the index space of a level, relative to an origin
+/// there. Sample n of the level is sample n 2^level of level 0.
+/// \param scene   in the index space of level 0; its rule's table is not changed
+/// \param origin  a voxel of the level
+ESVR_HD inline MarchScene sceneOfLevel(const MarchScene& scene, LevelFrame frame,
+                                       const Coord& origin) {
+  const Vec3 from = pointOf(origin);
+  MarchScene s = scene;
+  const double perSide = 1.0 / frame.side();
+  s.view.eye = difference(frame.place(scene.view.eye), from);
+  s.view.before *= perSide;
+  if (!s.view.perspective) {
+    s.view.pixel *= perSide, s.view.left *= perSide, s.view.top *= perSide;
+  }
+  s.clip.box = {difference(frame.place(scene.clip.box.low), from),
+                difference(frame.place(scene.clip.box.high), from)};
+  s.rule.step *= float(frame.side());
+  return s;
+}
+
+/// The samples of a picture's rays that are drawn in each level. Samples have the numbers of level
+/// 0. Level l begins at sample begin[l], a multiple of 2^l, and ends where level l + 1 begins.
+struct LevelBounds {
+  std::array<double, kLevels + 1> begin;
+  int first = 0, last = 0;  ///< levels that rays may meet in the box of the volume
+
+  [[nodiscard]] ESVR_HD bool oneLevel() const { return first == last; }
+};
+
+/// The bricks of cells of a level, and what rays need in it.
+struct LevelView {
+  BrickTableView table;        ///< in the voxels of the level
+  PlaceBox box;                ///< box of the cells, relative to the table's origin
+  TransferTableView transfer;  ///< for the steps of the level
+};
+
+struct LevelScene {
+  MarchScene scene;  ///< in the index space of level 0; its box and table are not used
+  LevelBounds bounds;
+  LevelView levels[kLevels];  ///< from bounds.first to bounds.last
+
+  /// \param place  0 for the level bounds.first, 1 for the next one, and so on
+  [[nodiscard]] ESVR_HD LevelFrame frame(int place) const { return {bounds.first + place}; }
+  /// The scene of a level, relative to the origin of its table.
+  [[nodiscard]] ESVR_HD MarchScene at(int place) const {
+    MarchScene s = sceneOfLevel(scene, frame(place), levels[place].table.origin);
+    s.box = levels[place].box;
+    s.rule.table = levels[place].transfer;
+    return s;
+  }
+  /// The place of the coarsest level.
+  [[nodiscard]] ESVR_HD int last() const { return bounds.last - bounds.first; }
+};
+
+/// What is known about a scene when code is compiled, which is then faster.
+struct MarchCode {
+  bool hasOneLevel = false;
+  bool isUsual = false;  ///< RenderMode::kComposite and Classification::kPreIntegrated
+  bool isShaded = false;
+};
+/// What is known about a scene.
+[[nodiscard]] inline MarchCode codeFor(const LevelScene& s) {
+  return {s.bounds.oneLevel(),
+          s.scene.rule.mode == RenderMode::kComposite &&
+              s.scene.rule.classification == Classification::kPreIntegrated,
+          s.scene.isShaded};
+}
+
+namespace level_march {
+
+/// Samples of level 0 as samples of another level.
+ESVR_HD inline SampleRange samplesOfLevel(const SampleRange& r, LevelFrame frame) {
+  return {std::ceil(r.first / frame.side()), std::floor(r.last / frame.side())};
+}
+
+/// The samples of a level. The sample at which the next level begins belongs to both, so that the
+/// segment before it is drawn in this one.
+/// \param wanted  samples of level 0
+ESVR_HD inline SampleRange rangeOf(const LevelScene& s, int place, const SampleRange& wanted) {
+  const LevelFrame frame = s.frame(place);
+  SampleRange own = wanted;
+  if (place > 0) own.first = s.bounds.begin[frame.level] + frame.side();
+  if (place < s.last()) own.last = s.bounds.begin[frame.level + 1];
+  return samplesOfLevel(own.both(wanted), frame);
+}
+
+/// The index of a sample of level 0 in a level (SampleNumber::index).
+ESVR_HD inline std::uint32_t indexOf(const MarchScene& scene, const Ray& ray, LevelFrame frame,
+                                     double sample) {
+  return std::uint32_t(std::int64_t(sample / frame.side() - samplesInScene(scene, ray).first));
+}
+
+/// Prepares a ray for the next level.
+ESVR_HD inline void passOn(const LevelScene& s, int column, int row, RayProgress& at) {
+  const MarchScene from = s.at(at.level), to = s.at(at.level + 1);
+  const LevelFrame before = s.frame(at.level), behind = s.frame(at.level + 1);
+  const double shared = s.bounds.begin[behind.level];
+  from.rule.passOn(at.ray, indexOf(from, from.view.ray(column, row), before, shared),
+                   indexOf(to, to.view.ray(column, row), behind, shared),
+                   Shades{at.shade, at.shade});
+  ++at.level;
+  at.next = 0;
+}
+
+/// Marches through one level.
+template <MarchCode kCode, class Slots, class Visitor>
+ESVR_HD inline bool marchLevel(const LevelScene& s, int place, const Slots& slots, int column,
+                               int row, const SampleRange& wanted, RayProgress& at,
+                               Visitor& visitor) {
+  MarchScene scene = s.at(place);
+  if constexpr (kCode.isUsual) {
+    scene.rule.mode = RenderMode::kComposite;
+    scene.rule.classification = Classification::kPreIntegrated;
+  }
+  const MarchSamples samples = samplesOf(scene, column, row, rangeOf(s, place, wanted));
+  const BrickTableView& table = s.levels[place].table;
+  if constexpr (kCode.isShaded) {
+    const Vec3 direction = scene.view.ray(column, row).direction;
+    const LitSamples lit{scene.light, floatPlace(scene.view.inCameraSpace(direction))};
+    return marchBricks(table, slots, scene, samples, at, visitor, lit);
+  } else {
+    return marchBricks(table, slots, scene, samples, at, visitor);
+  }
+}
+
+}  // namespace level_march
+
+/// The color of a ray that has ended.
+[[nodiscard]] ESVR_HD inline PixelColor finished(const LevelScene& s, const RayProgress& at) {
+  return s.at(at.level).rule.finished(at.ray, Shades{at.shade, at.shade});
+}
+
+/// Adds samples to a ray until it ends or meets a brick that is missing; see marchBricks().
+/// \tparam kCode   what is known about the scene when the code is compiled
+/// \param wanted  range of samples, as numbers of level 0
+template <MarchCode kCode, class Slots, class Visitor>
+ESVR_HD inline bool marchLevels(const LevelScene& s, const Slots& slots, int column, int row,
+                                const SampleRange& wanted, RayProgress& at, Visitor& visitor) {
+  using namespace level_march;
+  if constexpr (kCode.hasOneLevel) {
+    return marchLevel<kCode>(s, 0, slots, column, row, wanted, at, visitor);
+  } else {
+    for (;; passOn(s, column, row, at)) {
+      if (!marchLevel<kCode>(s, at.level, slots, column, row, wanted, at, visitor)) return false;
+      if (at.level == s.last() || !s.scene.rule.open(at.ray)) return true;
+    }
+  }
 }
 
 }  // namespace esvr

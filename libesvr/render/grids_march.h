@@ -1,11 +1,41 @@
 #pragma once
-/// Marches a ray through several grids at once. The code is compiled for host and device.
+/// Marches a ray through several grids at once (docs/math.md, "Several grids"). The march is
+/// compiled for host and device; the functions that set up its scene are for the host.
+
+#include <cstdint>
+#include <vector>
 
 #include "esvr/renderer.h"
 #include "render/brick_march.h"
-#include "render/light_mixture.h"
 
 namespace esvr {
+
+/// The light of several grids within one segment of a ray: adds up their extinctions and emissions.
+class LightMixture {
+ public:
+  /// \param light  of a grid by itself
+  ESVR_HD void add(const PixelColor& light, bool absorbs) {
+    if (!(light.alpha > 0.0f)) return;
+    const float own = depthOf(light.alpha), perAlpha = own / light.alpha;
+    r_ += light.r * perAlpha, g_ += light.g * perAlpha, b_ += light.b * perAlpha;
+    if (absorbs) depth_ += own;
+  }
+  /// The light of all grids, with the opacity of those that absorb.
+  [[nodiscard]] ESVR_HD PixelColor total() const {
+    const float alpha = -std::expm1(-depth_), share = depth_ > 0.0f ? alpha / depth_ : 1.0f;
+    return {r_ * share, g_ * share, b_ * share, alpha};
+  }
+
+ private:
+  /// The optical depth of an opacity. An opacity of 1 has the depth of the next smaller float.
+  ESVR_HD static float depthOf(float alpha) {
+    constexpr float kMost = 1.0f - 0x1p-24f;
+    return -std::log1p(-(alpha < kMost ? alpha : kMost));
+  }
+
+  float r_ = 0.0f, g_ = 0.0f, b_ = 0.0f;  ///< emission: color times optical depth
+  float depth_ = 0.0f;
+};
 
 /// One grid of a GridsScene.
 struct GridInScene {
@@ -18,8 +48,8 @@ struct GridInScene {
 };
 
 struct GridsScene {
-  /// Relative to an origin that all grids share; its box contains the cells of all. The table and the
-  /// background of its rule are not used.
+  /// Relative to an origin that all grids share; its box contains the cells of all. The table and
+  /// the background of its rule are not used.
   MarchScene scene;
   GridInScene grids[kMostGrids];
 };
@@ -31,6 +61,30 @@ struct GridsProgress {
   std::uint32_t inside = 0;     ///< bit g is set if the last sample of grid g is not empty space
   float last[kMostGrids] = {};  ///< value of that sample
 };
+
+/// A GridsProgress that waits, as KeptRay.
+struct KeptGridsRay {
+  int next;  ///< below 0: the ray has ended
+  std::uint32_t inside;
+  float last[kMostGrids];
+
+  [[nodiscard]] ESVR_HD static KeptGridsRay ended() { return {-1, 0, {}}; }
+  ESVR_HD static KeptGridsRay of(const GridsProgress& at) {
+    KeptGridsRay kept{at.next, at.inside, {}};
+    for (int g = 0; g < kMostGrids; ++g) kept.last[g] = at.last[g];
+    return kept;
+  }
+  [[nodiscard]] ESVR_HD GridsProgress progress(const PixelColor& channels) const {
+    GridsProgress at;
+    at.r = channels.r, at.g = channels.g, at.b = channels.b, at.transmittance = channels.alpha;
+    at.next = next, at.inside = inside;
+    for (int g = 0; g < kMostGrids; ++g) at.last[g] = last[g];
+    return at;
+  }
+};
+ESVR_HD inline PixelColor channelsOf(const GridsProgress& at) {
+  return {at.r, at.g, at.b, at.transmittance};
+}
 
 /// The visitor of a march through grids whose bricks all have slots or are vacant.
 struct AllGridsAreThere {
@@ -63,8 +117,8 @@ struct Cursor {
   }
 
  private:
-  /// The cube around a cell that lies outside a table. Blocks of the table begin at multiples of their
-  /// side, so that none lies in it.
+  /// The cube around a cell that lies outside a table. Blocks of the table begin at multiples of
+  /// their side, so that none lies in it.
   ESVR_HD static brick_march::Found outside(const Coord& cell) {
     constexpr int kMask = ~(kBlockSide - 1);
     return {kNoCells, {cell.x & kMask, cell.y & kMask, cell.z & kMask}, kBlockSide};
@@ -92,8 +146,7 @@ ESVR_HD inline bool look(const GridInScene& grid, const Slots& slots, int number
   const bool goesOn = cursor.moveTo(cell, grid.table, slots, number, visitor);
   sample.isMissing = sample.isMissing || cursor.isMissing;
   if (cursor.values == nullptr) {
-    sample.mayAdvance(
-        march::samplesToLeave(place, samples.perVoxel, cursor.found.low, cursor.found.side));
+    sample.mayAdvance(samplesToLeave(place, samples.perVoxel, cursor.found.low, cursor.found.side));
     return goesOn;
   }
   sample.mayAdvance(1);
@@ -168,5 +221,35 @@ template <int kGrids>
   if (at.inside != 0) grids_march::add<kGrids>(s, {}, at);
   return {at.r, at.g, at.b, 1.0f - at.transmittance};
 }
+
+// The scene of a picture.
+
+/// \throws UsageError  as for renderField; the options have not as many looks as there are grids, or
+///                     ask for something that several grids do not have (makeGridsRenderer)
+void checkGridsOptions(const RenderOptions& options, std::size_t grids);
+
+/// The look of a grid of a picture; that of the first one is RenderOptions::transfer.
+[[nodiscard]] GridLook lookOf(const RenderOptions& options, std::size_t grid);
+
+/// The cells of a grid.
+struct GridTable {
+  BrickTableView table;
+  PlaceBox box;  ///< of the cells, relative to the table's origin; empty if there are none
+  TransferTableView transfer;
+  float background;
+};
+
+/// \param options  as checkGridsOptions() requires
+/// \param grids    at least one of them has cells
+[[nodiscard]] GridsScene gridsScene(const RenderOptions& options,
+                                    const std::vector<GridTable>& grids);
+
+/// The first sample of a bin in which a ray may meet a grid, counted from the eye.
+/// \throws UsageError  a ray is too long
+[[nodiscard]] double firstSampleOf(const GridsScene& scene);
+
+/// The view for covers of the bricks of a grid, whose places are relative to its table's origin.
+[[nodiscard]] CoverView coverViewOf(const GridsScene& scene, std::size_t grid,
+                                    Resolution resolution);
 
 }  // namespace esvr

@@ -1,12 +1,10 @@
-
+// Draws a NanoVDB grid on the CPU.
 #include <stdexcept>
 
 #include "core/parallel.h"
 #include "esvr/renderer.h"
-#include "render/nano_box.h"
 #include "render/nano_march.h"
 #include "render/picture.h"
-#include "render/scene_depth.h"
 
 namespace esvr {
 namespace {
@@ -25,22 +23,6 @@ void drawAs(const NanoVolume& volume, const RenderOptions& o, Picture& picture) 
   });
 }
 
-void drawInto(Picture& picture, const NanoVolume& volume, const RenderOptions& o) {
-  switch (volume.values) {
-    case NanoValues::kFloat:
-      return drawAs<float>(volume, o, picture);
-    case NanoValues::kFp4:
-      return drawAs<nanovdb::Fp4>(volume, o, picture);
-    case NanoValues::kFp8:
-      return drawAs<nanovdb::Fp8>(volume, o, picture);
-    case NanoValues::kFp16:
-      return drawAs<nanovdb::Fp16>(volume, o, picture);
-    case NanoValues::kFpN:
-      return drawAs<nanovdb::FpN>(volume, o, picture);
-  }
-  throw std::logic_error("renderNano: no such values");
-}
-
 }  // namespace
 
 Image renderNano(const NanoVolume& volume, const RenderOptions& options) {
@@ -49,7 +31,22 @@ Image renderNano(const NanoVolume& volume, const RenderOptions& options) {
   refuseShading(options);
   if (box.low[0] > box.high[0]) return picture.take();
   checkRayLength(binsWithin(box, picture.view, options.step));
-  drawInto(picture, volume, options);
+  const auto draw = [&] {
+    switch (volume.values) {
+      case NanoValues::kFloat:
+        return drawAs<float>(volume, options, picture);
+      case NanoValues::kFp4:
+        return drawAs<nanovdb::Fp4>(volume, options, picture);
+      case NanoValues::kFp8:
+        return drawAs<nanovdb::Fp8>(volume, options, picture);
+      case NanoValues::kFp16:
+        return drawAs<nanovdb::Fp16>(volume, options, picture);
+      case NanoValues::kFpN:
+        return drawAs<nanovdb::FpN>(volume, options, picture);
+    }
+    throw std::logic_error("renderNano: no such values");
+  };
+  draw();
   return picture.take();
 }
 

@@ -1,19 +1,100 @@
-
+// Draws a volume on the CPU, in float64 and straight from its voxels. It shares with the march
+// through bricks of cells only the rule for samples, and is the reference for it.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
+#include "core/brick_index.h"
+#include "core/cell_corner.h"
 #include "core/parallel.h"
-#include "render/level_tables.h"
-#include "render/render_levels.h"
-#include "render/scene_depth.h"
-#include "render/voxel_sampler.h"
+#include "render/picture.h"
+#include "render/render_cells.h"
 
 namespace esvr {
 namespace {
 
-/// The number of the first sample behind an empty brick. Because of rounding, a sample on the far face
-/// of the brick may be visited twice, but it is never skipped.
+// Trilinear interpolation.
+
+/// The eight voxels around a place, given by the lowest of them and the position of the place
+/// between it and the next voxels, from 0 to 1 along each axis.
+struct Cell {
+  Coord voxel;
+  std::array<float, 3> fraction;
+};
+
+Cell cellOf(const Vec3& place) {
+  const double x = std::floor(place[0]), y = std::floor(place[1]), z = std::floor(place[2]);
+  return {{std::int32_t(x), std::int32_t(y), std::int32_t(z)},
+          {float(place[0] - x), float(place[1] - y), float(place[2] - z)}};
+}
+
+/// Interpolates in a volume, to which it keeps a reference. Coordinates are relative to the
+/// volume's origin.
+class VoxelSampler {
+ public:
+  /// The numbers of a brick and of its seven upper neighbours, by the number of the corner. kNone:
+  /// no such brick.
+  using Corners = std::array<std::uint32_t, kCellCorners>;
+
+  explicit VoxelSampler(const SparseVolume& volume);
+
+  /// The bricks that the cells of a brick read; null if all these voxels are the background.
+  [[nodiscard]] const Corners* find(Coord brick) const {
+    const std::uint32_t at = index_.find(brick);
+    return at == BrickIndex::kNone ? nullptr : &corners_[at];
+  }
+  /// The result is exactly the background if all eight voxels are.
+  [[nodiscard]] float interpolate(const Corners& corners, const Cell& cell) const;
+
+  /// All cells outside this box have the background at their corners.
+  [[nodiscard]] const Vec3& low() const { return low_; }
+  [[nodiscard]] const Vec3& high() const { return high_; }
+
+ private:
+  [[nodiscard]] float value(const Corners& corners, Coord local) const;
+
+  const SparseVolume& volume_;
+  BrickIndex index_;
+  std::vector<Corners> corners_;
+  Vec3 low_, high_;
+};
+
+VoxelSampler::VoxelSampler(const SparseVolume& volume)
+    : volume_(volume), index_(bricksWithCells(volume.bricks)) {
+  const BrickIndex stored(volume.bricks);
+  for (const Coord brick : index_.bricks()) {
+    Corners corners;
+    for (int c = 0; c < kCellCorners; ++c) corners[c] = stored.find(brick + stepToCorner(c));
+    corners_.push_back(corners);
+  }
+  Box box;
+  for (const Coord brick : volume.bricks) box.expand(brick);
+  low_ = difference(pointOf(box.min * kBrickSide), {1.0, 1.0, 1.0});
+  high_ = pointOf((box.max + Coord{1, 1, 1}) * kBrickSide);
+}
+
+float VoxelSampler::value(const Corners& corners, Coord local) const {
+  const std::uint32_t brick = corners[cornerAt(brickOf(local))];
+  if (brick == BrickIndex::kNone) return volume_.background;
+  return volume_.values[std::size_t(brick) * kBrickVoxels + voxelOffset(localOf(local))];
+}
+
+float VoxelSampler::interpolate(const Corners& corners, const Cell& cell) const {
+  const Coord local = localOf(cell.voxel);
+  float v[kCellCorners];
+  for (int c = 0; c < kCellCorners; ++c) v[c] = value(corners, local + stepToCorner(c));
+  const auto between = [](float a, float b, float s) { return a + s * (b - a); };
+  const auto [x, y, z] = cell.fraction;
+  const float low = between(between(v[0], v[1], z), between(v[2], v[3], z), y);
+  const float high = between(between(v[4], v[5], z), between(v[6], v[7], z), y);
+  return between(low, high, x);
+}
+
+// The march of a ray.
+
+/// The number of the first sample behind an empty brick. Because of rounding, a sample on the far
+/// face of the brick may be visited twice, but it is never skipped.
 double behindBrick(const Ray& ray, Coord brick, double step) {
   constexpr double kRounding = 1e-6;
   const Vec3 low{double(brick.x) * kBrickSide, double(brick.y) * kBrickSide,
@@ -101,6 +182,7 @@ PlaceBox boxOf(const SparseVolume& volume) {
           {double(high.x), double(high.y), double(high.z)}};
 }
 
+/// A volume at the levels of detail of a picture.
 class VolumePicture {
  public:
   VolumePicture(VolumeLevels& levels, const RenderOptions& options, const Picture& picture)

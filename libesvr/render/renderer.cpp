@@ -1,19 +1,21 @@
+// Makes renderers, which keep voxels from picture to picture, for the CPU or a CUDA device.
 #include "esvr/renderer.h"
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <utility>
 
+#include "esvr/device_bricks.h"
 #include "esvr/error.h"
-#include "render/cuda/make_cuda_renderer.h"
+#include "render/cuda/cuda_renderers.h"
 #include "render/render_cells.h"
-#include "render/render_grids.h"
-#include "render/render_levels.h"
 
 namespace esvr {
 namespace {
 
-/// A renderer on the CPU, which calls a function of render.h for each picture.
+/// A renderer on the CPU.
+/// \tparam Draw  draw(options) returns a picture; draw.forget() is optional
 template <class Draw>
 class CpuRenderer final : public Renderer {
  public:
@@ -60,6 +62,21 @@ struct VolumeDrawing {
   VolumeLevels levels;
 };
 
+/// Draws several grids on the CPU. Their voxels are kept from picture to picture.
+struct GridsDrawing {
+  Image operator()(const RenderOptions& options) { return renderGrids(grids, options); }
+  void forget() {
+    for (GridCells& grid : grids) grid.forget();
+  }
+
+  std::vector<GridCells> grids;
+};
+
+template <class Draw>
+std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
+  return std::make_unique<CpuRenderer<Draw>>(std::move(draw));
+}
+
 /// Draws a field on a CUDA device with one renderer for each rule between voxels. A renderer is
 /// made when it is needed, because each keeps data of its own on the device.
 class CudaFieldRenderers final : public Renderer {
@@ -84,7 +101,7 @@ class CudaFieldRenderers final : public Renderer {
     auto& renderer = between == Between::kSum ? sums_ : cells_;
     if (!renderer)
       renderer =
-          (between == Between::kSum ? cuda::makeCudaFieldRenderer : cuda::makeCudaCellRenderer)(
+          (between == Between::kSum ? cuda::makeCudaSumRenderer : cuda::makeCudaCellRenderer)(
               field_, device_, limits_, voxels_);
     last_ = renderer.get();
     return *renderer;
@@ -97,27 +114,6 @@ class CudaFieldRenderers final : public Renderer {
   std::unique_ptr<Renderer> sums_, cells_;
   Renderer* last_ = nullptr;
 };
-
-/// Draws several grids on the CPU. Their voxels are kept from picture to picture.
-struct GridsDrawing {
-  Image operator()(const RenderOptions& options) { return renderGrids(grids, options); }
-  void forget() {
-    for (GridCells& grid : grids) grid.forget();
-  }
-
-  std::vector<GridCells> grids;
-};
-
-void requireNumberOfGrids(std::size_t grids) {
-  if (grids < 1 || grids > std::size_t(kMostGrids))
-    throw UsageError("a picture can show 1 to " + std::to_string(kMostGrids) + " grids, not " +
-                     std::to_string(grids));
-}
-
-template <class Draw>
-std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
-  return std::make_unique<CpuRenderer<Draw>>(std::move(draw));
-}
 
 }  // namespace
 
@@ -140,7 +136,9 @@ std::unique_ptr<Renderer> makeVolumeRenderer(const SparseVolume& volume, const D
 
 std::unique_ptr<Renderer> makeGridsRenderer(const std::vector<DrawnGrid>& grids,
                                             const Device& device, const RendererLimits& limits) {
-  requireNumberOfGrids(grids.size());
+  if (grids.empty() || grids.size() > std::size_t(kMostGrids))
+    throw UsageError("a picture can show 1 to " + std::to_string(kMostGrids) + " grids, not " +
+                     std::to_string(grids.size()));
   if (device.kind == DeviceKind::kCuda) return cuda::makeCudaGridsRenderer(grids, device, limits);
   return makeCpuRenderer(GridsDrawing{{grids.begin(), grids.end()}});
 }
@@ -149,6 +147,20 @@ std::unique_ptr<Renderer> makeNanoRenderer(const NanoVolume& volume, const Devic
                                            const RendererLimits& limits) {
   if (device.kind == DeviceKind::kCuda) return cuda::makeCudaNanoRenderer(volume, device, limits);
   return makeCpuRenderer([&volume](const RenderOptions& o) { return renderNano(volume, o); });
+}
+
+// The bricks of a field.
+
+void evaluateBricksOn(const Device& device, const Field& field, std::span<const Coord> corners,
+                      std::span<float> out) {
+  if (device.kind == DeviceKind::kCuda)
+    cuda::decodeBricks(device, field, corners, out);
+  else
+    evaluateBricks(field, corners, out);
+}
+
+Arithmetic arithmeticOf(const Device& device) {
+  return {.integerSums = device.kind == DeviceKind::kCuda};
 }
 
 }  // namespace esvr

@@ -1,20 +1,126 @@
 #pragma once
-/// The rule that combines the samples of a ray into a pixel. The code is compiled for host and
-/// device.
+/// The samples of a ray, and the rule that lights them and combines them into a pixel. Nothing here
+/// depends on how voxels are stored. The code is compiled for host and device.
 
 #include <cstdint>
 
 #include "esvr/render.h"
-#include "render/shading.h"
 #include "render/transfer_table.h"
+#include "render/view.h"
 
 namespace esvr {
+
+struct FloatPlace {
+  float x, y, z;
+};
+
+ESVR_HD inline FloatPlace floatPlace(const Vec3& v) {
+  return {float(v[0]), float(v[1]), float(v[2])};
+}
+ESVR_HD inline float inner(const FloatPlace& a, const FloatPlace& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+// Shading by the gradient of the values, with one distant light: the model of Blinn and Phong, in
+// which surfaces are lit from both sides.
+
+/// What the light makes of a color at a place.
+struct Shade {
+  float color = 1.0f;  ///< factor of the color
+  float white = 0.0f;  ///< highlight, which is added for an opacity of 1
+
+  [[nodiscard]] ESVR_HD PixelColor lit(const PixelColor& c) const {
+    const float highlight = white * c.alpha;
+    return {c.r * color + highlight, c.g * color + highlight, c.b * color + highlight, c.alpha};
+  }
+};
+
+struct LightRule {
+  FloatPlace toLight;  ///< of unit length
+  float ambient, diffuse, specular, shininess;
+  float weakSquared;  ///< square of a gradient that has half of its effect
+  /// Whether voxels are no cubes. The rows of `toCamera` then convert gradients from the index
+  /// space to the camera's space.
+  bool converts = false;
+  FloatPlace toCamera[3] = {};
+
+  /// \param inIndex    gradient of the values in index space; a place without one is lit from the front
+  /// \param direction  of the ray in the camera's space, of unit length
+  [[nodiscard]] ESVR_HD Shade shadeOf(const FloatPlace& inIndex,
+                                      const FloatPlace& direction) const {
+    const FloatPlace gradient =
+        converts ? FloatPlace{inner(toCamera[0], inIndex), inner(toCamera[1], inIndex),
+                              inner(toCamera[2], inIndex)}
+                 : inIndex;
+    const float squared = inner(gradient, gradient);
+    if (!(squared > 0.0f)) return {ambient + diffuse, 0.0f};
+    const float perLength = 1.0f / std::sqrt(squared);
+    const FloatPlace half{toLight.x - direction.x, toLight.y - direction.y,
+                          toLight.z - direction.z};
+    const float facing = std::fabs(inner(gradient, toLight)) * perLength;
+    const float mirrored = std::fabs(inner(gradient, half)) * perLength / lengthOf(half);
+    const float strength = squared / (squared + weakSquared);
+    return {ambient + diffuse * (1.0f + strength * (facing - 1.0f)),
+            strength * specular * std::pow(mirrored, shininess)};
+  }
+
+ private:
+  /// The length, or a small number for a light behind the volume, which has no highlights.
+  ESVR_HD static float lengthOf(const FloatPlace& v) {
+    constexpr float kShort = 1e-6f;
+    const float length = std::sqrt(inner(v, v));
+    return length > kShort ? length : kShort;
+  }
+};
+
+/// \throws UsageError  the direction has no length, or a factor is negative or not finite
+[[nodiscard]] LightRule lightRule(const Shading& shading, const View& view,
+                                  const TransferFunction& transfer);
+
+/// A rule that leaves colors as they are; see SampleRule::add().
+struct NoShades {
+  [[nodiscard]] ESVR_HD PixelColor ofLast(const PixelColor& c) const { return c; }
+  [[nodiscard]] ESVR_HD PixelColor ofThis(const PixelColor& c) const { return c; }
+};
+/// The shades at the last sample that was added to a ray and at the one that is added now.
+struct Shades {
+  Shade last, now;
+  [[nodiscard]] ESVR_HD PixelColor ofLast(const PixelColor& c) const { return last.lit(c); }
+  [[nodiscard]] ESVR_HD PixelColor ofThis(const PixelColor& c) const { return now.lit(c); }
+};
+
+/// The range of coordinates between which a derivative is taken: half a voxel to each side, but not
+/// beyond the brick, so that the voxels of one brick suffice.
+struct DifferenceRange {
+  float low, high;
+};
+/// \param at    coordinate relative to the brick, from 0 to `side`
+ESVR_HD inline DifferenceRange differenceRange(float at, float side) {
+  constexpr float kHalf = 0.5f;
+  return {at > kHalf ? at - kHalf : 0.0f, at < side - kHalf ? at + kHalf : side};
+}
+
+/// The gradient of interpolated values. \param valueAt  value at a place relative to the brick
+/// \param p  place relative to a brick of `side` voxels
+template <class ValueAt>
+ESVR_HD inline FloatPlace gradientAt(const FloatPlace& p, float side, ValueAt&& valueAt) {
+  const DifferenceRange x = differenceRange(p.x, side), y = differenceRange(p.y, side),
+                        z = differenceRange(p.z, side);
+  return {(valueAt(FloatPlace{x.high, p.y, p.z}) - valueAt(FloatPlace{x.low, p.y, p.z})) /
+              (x.high - x.low),
+          (valueAt(FloatPlace{p.x, y.high, p.z}) - valueAt(FloatPlace{p.x, y.low, p.z})) /
+              (y.high - y.low),
+          (valueAt(FloatPlace{p.x, p.y, z.high}) - valueAt(FloatPlace{p.x, p.y, z.low})) /
+              (z.high - z.low)};
+}
+
+// The rule that combines samples.
 
 /// A sample's place in the sequence of a ray's samples.
 struct SampleNumber {
   float fromEye;  ///< number of the sample, counted from the eye
-  /// The same, counted from any sample of the ray and modulo 2^32. Unlike the float, it tells whether
-  /// two samples are consecutive however far away the eye is.
+  /// The same, counted from any sample of the ray and modulo 2^32. Unlike the float, it tells
+  /// whether two samples are consecutive however far away the eye is.
   std::uint32_t index;
 };
 /// \param number  of the sample, counted from where rays begin
@@ -84,8 +190,8 @@ struct SampleRule {
     ray.last = number.index, ray.lastValue = value;
   }
 
-  /// Goes on to samples that follow another rule, for example in another level of detail. Their first
-  /// one is the sample that this rule has reached.
+  /// Goes on to samples that follow another rule, for example in another level of detail. Their
+  /// first one is the sample that this rule has reached.
   /// \param here, there  index of that sample in the old and in the new samples
   template <class ShadeRule = NoShades>
   ESVR_HD void passOn(RayState& ray, std::uint32_t here, std::uint32_t there,
@@ -167,8 +273,8 @@ struct SampleRule {
   }
 };
 
-/// The sampling that the tables of a picture are made for. In kMaximum and kAverage one value stands
-/// for the whole ray, and has the opacity of the transfer function.
+/// The sampling that the tables of a picture are made for. In kMaximum and kAverage one value
+/// stands for the whole ray, and has the opacity of the transfer function.
 /// \param times  length of a step in units of options.step
 [[nodiscard]] inline Sampling samplingOf(const RenderOptions& options, double times = 1.0) {
   const bool alongRay =
@@ -181,6 +287,82 @@ struct SampleRule {
 [[nodiscard]] inline SampleRule sampleRule(const RenderOptions& o, const TransferTableView& table,
                                            float background) {
   return {table, o.mode, o.classification, background, float(o.minTransmittance), float(o.step)};
+}
+
+// The samples of a march through voxels.
+
+/// What all rays of a march share.
+struct MarchScene {
+  View view;
+  PlaceBox box;  ///< every sample outside this box is the background
+  double step;
+  ClipBox clip;
+  SampleRule rule;
+  bool isShaded = false;
+  LightRule light{};  ///< used if isShaded
+};
+
+/// The samples of a ray inside the box, of which `begin` to `end` - 1 are wanted. Sample i lies at
+/// first + i apart. It is computed from the first sample in the box and not from the eye, so that
+/// float32 is precise enough, and not from the first one that is wanted, so that it does not depend
+/// on what is wanted.
+struct MarchSamples {
+  FloatPlace first, apart;
+  FloatPlace perVoxel;  ///< samples in a step of a voxel along each axis; 0 where they do not move
+  float number;         ///< number of sample 0, counted from the camera's eye
+  int begin, end;
+
+  [[nodiscard]] ESVR_HD FloatPlace at(int i) const {
+    const float n = float(i);
+    return {first.x + n * apart.x, first.y + n * apart.y, first.z + n * apart.z};
+  }
+  [[nodiscard]] ESVR_HD SampleNumber numberOf(int i) const {
+    return {number + float(i), std::uint32_t(i)};
+  }
+};
+
+ESVR_HD inline float samplesPerVoxel(float apart) {
+  constexpr float kStill = 1e-30f;  // so slow that no ray is long enough to leave a brick
+  return std::fabs(apart) < kStill ? 0.0f : 1.0f / apart;
+}
+
+/// The samples of a ray in the box and in the clip box.
+ESVR_HD inline SampleRange samplesInScene(const MarchScene& s, const Ray& ray) {
+  return samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step));
+}
+
+/// The samples of the ray of a pixel. \param wanted  further limit on their range
+ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
+                                      const SampleRange& wanted) {
+  const Ray ray = s.view.ray(column, row);
+  const SampleRange range = samplesInScene(s, ray);
+  const SampleRange both = range.both(wanted);
+  if (!(both.first <= both.last)) return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0, 0};
+  const FloatPlace apart = floatPlace(scaled(ray.direction, s.step));
+  return {floatPlace(sum(ray.origin, scaled(ray.direction, range.first * s.step))),
+          apart,
+          {samplesPerVoxel(apart.x), samplesPerVoxel(apart.y), samplesPerVoxel(apart.z)},
+          float(range.first + s.view.before / s.step),
+          range.countTo(both.first),
+          range.countTo(both.last) + 1};
+}
+
+ESVR_HD inline float samplesToFace(float place, float perVoxel, int low, int high) {
+  if (perVoxel == 0.0f) return 1e30f;
+  return ((perVoxel > 0.0f ? float(high) : float(low)) - place) * perVoxel;
+}
+
+/// Number of samples from a place to the first one outside an empty cube, at least 1.
+/// \param low, side  lowest corner and side of the cube
+ESVR_HD inline int samplesToLeave(const FloatPlace& p, const FloatPlace& perVoxel, const Coord& low,
+                                  int side) {
+  constexpr float kRounding = 1e-3f;
+  const float x = samplesToFace(p.x, perVoxel.x, low.x, low.x + side);
+  const float y = samplesToFace(p.y, perVoxel.y, low.y, low.y + side);
+  const float z = samplesToFace(p.z, perVoxel.z, low.z, low.z + side);
+  const float leave = x < y ? (x < z ? x : z) : (y < z ? y : z);
+  const float whole = std::ceil(leave - kRounding);
+  return whole > 1.0f ? (whole < 1e9f ? int(whole) : 1000000000) : 1;
 }
 
 }  // namespace esvr

@@ -1,19 +1,16 @@
-// Plan: several grids in one picture. The reference solves the equation of emission and absorption in
-// float64: each segment is divided into many parts, in which the values are interpolated linearly,
-// and the extinctions and emissions of the grids add up. Further: one grid, and a second one that
-// is transparent or empty, look as a grid does by itself; the order of the grids does not matter;
-// emission hides nothing. Fields and their decoded volumes give the same picture.
+// Plan: several grids in one picture. The reference solves the equation of emission and absorption
+// in float64: each segment is divided into many parts, in which the values are interpolated
+// linearly, and the extinctions and emissions of the grids add up. Further: one grid, and a second
+// one that is transparent or empty, look as a grid does by itself; the order of the grids does not
+// matter; emission hides nothing. Fields and their decoded volumes give the same picture.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "render/reference_light.h"
 #include "render/reference_picture.h"
-#include "render/trilinear.h"
 #include "render/two_grids.h"
-#include "render/vector.h"
 #include "render/view.h"
 #include "support/on_threads.h"
 

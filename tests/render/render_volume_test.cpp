@@ -10,8 +10,7 @@
 #include "esvr/render.h"
 #include "render/brick_scene.h"
 #include "render/reference_picture.h"
-#include "render/trilinear.h"
-#include "render/vector.h"
+#include "render/view.h"
 #include "support/on_threads.h"
 
 namespace esvr::test {

@@ -1,3 +1,4 @@
+// Decodes bricks of cells from ellipsoids, and averages them for coarser levels of detail.
 #include "core/cell_corner.h"
 #include "core/cuda/check.h"
 #include "core/cuda/integer_sum.cuh"
@@ -6,7 +7,7 @@
 #include "core/cuda/thread_number.cuh"
 #include "field/line_math.h"
 #include "field/local_box.h"
-#include "render/cuda/decode_cells.h"
+#include "render/cuda/cell_store.h"
 
 namespace esvr::cuda {
 namespace {
@@ -291,8 +292,8 @@ __device__ bool writeVoxel(const CellFieldView& field, const Coord& at, float va
   return value != field.rule.background;
 }
 
-/// Each block makes the voxels of a coarser brick that lie in one cube. The cube is a brick of level
-/// 0, or as large as one voxel of the level if that is larger.
+/// Each block makes the voxels of a coarser brick that lie in one cube. The cube is a brick of
+/// level 0, or as large as one voxel of the level if that is larger.
 __global__ void __launch_bounds__(kThreads)
     averageKernel(const DecodeArguments a, int level, int cubes) {
   __shared__ Averaging memory;

@@ -1,11 +1,10 @@
 #include "core/refuse_cuda.h"
-#include "render/cuda/decode_bricks.h"
-#include "render/cuda/make_cuda_renderer.h"
+#include "render/cuda/cuda_renderers.h"
 
 namespace esvr::cuda {
 
-std::unique_ptr<Renderer> makeCudaFieldRenderer(const Field&, const Device& device,
-                                                const RendererLimits&, const RevoxeliseOptions&) {
+std::unique_ptr<Renderer> makeCudaSumRenderer(const Field&, const Device& device,
+                                              const RendererLimits&, const RevoxeliseOptions&) {
   refuseCuda("drawing", device);
 }
 

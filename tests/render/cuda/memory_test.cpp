@@ -1,11 +1,14 @@
-// Plan: a picture for which the device has too little memory ends with an error that says so, and the
-// renderer draws again afterwards.
+// Plan: a picture for which the device has too little memory ends with an error that says so, and
+// the renderer draws again afterwards. Slots that bricks leave are chosen in the order of their
+// last reading, and only those that have an owner.
 #include <cuda_runtime_api.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "esvr/error.h"
 #include "esvr/renderer.h"
 #include "field/random_field.h"
+#include "render/cuda/cell_store.h"
 #include "support/on_device.h"
 
 namespace esvr::test {
@@ -45,6 +48,23 @@ TEST_F(MemoryOnGpu, IsSaidToBeExhaustedAndIsUsedAgain) {
     EXPECT_EQ(renderer->draw(small).rgba, expected.rgba);
   }
   EXPECT_EQ(renderer->draw(large).width, 4000);
+}
+
+using cuda::kNoOwner;
+using cuda::oldestSlots;
+using testing::IsEmpty;
+using testing::UnorderedElementsAre;
+
+const std::vector<std::uint32_t> kOwners{10, 11, kNoOwner, 12}, kStamps{5, 2, 0, 9};
+
+TEST(OldestSlots, AreThoseThatWereNotReadForTheLongestTime) {
+  EXPECT_THAT(oldestSlots(1, kOwners, kStamps), UnorderedElementsAre(1u));
+  EXPECT_THAT(oldestSlots(2, kOwners, kStamps), UnorderedElementsAre(0u, 1u));
+}
+
+TEST(OldestSlots, AreNoMoreThanThereAre) {
+  EXPECT_THAT(oldestSlots(9, kOwners, kStamps), UnorderedElementsAre(0u, 1u, 3u));
+  EXPECT_THAT(oldestSlots(3, {}, {}), IsEmpty());
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 /**
- * Reads ParaView's presets: JSON, and the XML of older versions (libesvr/render/paraview_preset.cpp,
- * paraview_xml.cpp).
+ * Reads ParaView's presets: JSON, and the XML of older versions (libesvr/render/paraview_preset.cpp).
  * @typedef {import("../types.js").Preset} Preset
  */
 

@@ -1,7 +1,6 @@
 /**
- * The shaders of the ray marcher. They follow the library's renderer (libesvr/render: march_scene.h,
- * brick_march.h, sample_rule.h, segment_table.h, transfer_table.h, shading.h), whose headers explain
- * the rules; the same names mean the same things.
+ * The shaders of the ray marcher. They follow the library's renderer (libesvr/render: brick_march.h,
+ * sample_rule.h, transfer_table.h), whose headers explain the rules; the same names mean the same things.
  *
  * A place in the transfer function's tables counts intervals from the lowest value. Since it depends
  * linearly on the value, rays carry places in place of values.

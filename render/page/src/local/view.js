@@ -1,6 +1,6 @@
 /**
  * A camera as what the shader needs, in the index space of a level of detail (libesvr/render/view.h,
- * level_of_detail.h).
+ * brick_march.h).
  * @typedef {import("../types.js").Triple} Triple
  * @typedef {import("../types.js").Camera} Camera
  */

@@ -1,5 +1,5 @@
 /**
- * Mixes colors as the library does (libesvr/render/color_spaces.cpp), so that the editor shows the
+ * Mixes colors as the library does (libesvr/render/transfer_function.cpp), so that the editor shows the
  * colors of the picture.
  * @typedef {import("../types.js").Triple} Triple
  */

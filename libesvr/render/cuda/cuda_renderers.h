@@ -1,0 +1,48 @@
+#pragma once
+/// What the rest of the library draws and decodes on a CUDA device. The functions exist in every
+/// build, and this header does not include those of CUDA.
+
+#include <span>
+
+#include "esvr/renderer.h"
+
+namespace esvr::cuda {
+
+/// Draws the sum of ellipsoids.
+/// \throws DeviceError  the device does not exist, its memory is exhausted, or the build has no
+///                      CUDA
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaSumRenderer(const Field& field,
+                                                            const Device& device,
+                                                            const RendererLimits& limits,
+                                                            const RevoxeliseOptions& voxels);
+/// Draws the voxels of a field, which are decoded on the device brick by brick.
+/// \throws DeviceError     as for makeCudaSumRenderer
+/// \throws RuntimeFailure, UsageError  as for makeCellField
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaCellRenderer(const Field& field,
+                                                             const Device& device,
+                                                             const RendererLimits& limits,
+                                                             const RevoxeliseOptions& voxels);
+/// Draws the voxels of a volume, which must outlive the renderer.
+/// \throws DeviceError  as for makeCudaSumRenderer
+/// \throws UsageError   the voxels lie too far apart for the tables of a BrickAtlas
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaVolumeRenderer(const SparseVolume& volume,
+                                                               const Device& device,
+                                                               const RendererLimits& limits);
+/// Draws a NanoVDB grid.
+/// \throws DeviceError  as for makeCudaSumRenderer
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaNanoRenderer(const NanoVolume& volume,
+                                                             const Device& device,
+                                                             const RendererLimits& limits);
+/// Draws several grids (makeGridsRenderer).
+/// \throws DeviceError  as for makeCudaSumRenderer
+/// \throws RuntimeFailure, UsageError  as for makeCudaCellRenderer and makeCudaVolumeRenderer
+[[nodiscard]] std::unique_ptr<Renderer> makeCudaGridsRenderer(const std::vector<DrawnGrid>& grids,
+                                                              const Device& device,
+                                                              const RendererLimits& limits);
+
+/// Decodes given bricks of a field. The arguments and exceptions are those of evaluateBricksOn
+/// (esvr/device_bricks.h).
+void decodeBricks(const Device& device, const Field& field, std::span<const Coord> corners,
+                  std::span<float> out);
+
+}  // namespace esvr::cuda
