@@ -3,7 +3,6 @@
 // when memory is short.
 #include <algorithm>
 
-#include "core/brick_index.h"
 #include "core/cuda/check.h"
 #include "core/cuda/copy.h"
 #include "core/cuda/thread_number.cuh"
