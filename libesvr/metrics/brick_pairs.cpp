@@ -1,11 +1,17 @@
 #include "metrics/brick_pairs.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
 #include <cstdint>
 #include <span>
 
+#include "core/parallel.h"
+
 namespace esvr::metrics {
 namespace {
+
+// The pairs. Two cursors walk over the sorted bricks of both volumes.
 
 /// True if an inactive voxel has the negated background, as inside the surface of a narrow band.
 bool hasNegatedBackground(const SparseVolume& volume) {
@@ -66,16 +72,6 @@ class BrickCursor {
   std::size_t at_ = 0;
 };
 
-Coord nextPlace(const BrickCursor& a, const BrickCursor& b) {
-  if (a.done()) return b.brick();
-  if (b.done()) return a.brick();
-  return std::min(a.brick(), b.brick());
-}
-
-std::int32_t clampLocal(std::int64_t coordinate) {
-  return std::int32_t(std::clamp<std::int64_t>(coordinate, -1, kBrickSide));
-}
-
 }  // namespace
 
 std::vector<BrickPair> pairBricks(const SparseVolume& reference, const SparseVolume& candidate) {
@@ -83,7 +79,8 @@ std::vector<BrickPair> pairBricks(const SparseVolume& reference, const SparseVol
   std::vector<BrickPair> pairs;
   pairs.reserve(std::max(reference.brickCount(), candidate.brickCount()));
   while (!a.done() || !b.done()) {
-    BrickPair pair{.brick = nextPlace(a, b)};
+    BrickPair pair;
+    pair.brick = a.done() ? b.brick() : (b.done() ? a.brick() : std::min(a.brick(), b.brick()));
     pair.referenceEmpty = a.emptyValue(pair.brick);
     pair.candidateEmpty = b.emptyValue(pair.brick);
     if (a.isAt(pair.brick)) {
@@ -102,15 +99,87 @@ std::vector<BrickPair> pairBricks(const SparseVolume& reference, const SparseVol
 }
 
 Box localBox(Coord brick, const Box& box) {
-  const auto low = [](std::int32_t side, std::int32_t brickSide) {
-    return std::max(clampLocal(std::int64_t(side) - std::int64_t(brickSide) * kBrickSide), 0);
+  const auto local = [](std::int32_t side, std::int32_t brickSide) {
+    const std::int64_t at = std::int64_t(side) - std::int64_t(brickSide) * kBrickSide;
+    return std::int32_t(std::clamp<std::int64_t>(at, -1, kBrickSide));
   };
-  const auto high = [](std::int32_t side, std::int32_t brickSide) {
-    return std::min(clampLocal(std::int64_t(side) - std::int64_t(brickSide) * kBrickSide),
-                    kBrickSide - 1);
+  const auto low = [&](std::int32_t side, std::int32_t brickSide) {
+    return std::max(local(side, brickSide), 0);
+  };
+  const auto high = [&](std::int32_t side, std::int32_t brickSide) {
+    return std::min(local(side, brickSide), kBrickSide - 1);
   };
   return {{low(box.min.x, brick.x), low(box.min.y, brick.y), low(box.min.z, brick.z)},
           {high(box.max.x, brick.x), high(box.max.y, brick.y), high(box.max.z, brick.z)}};
+}
+
+namespace {
+
+// The order statistic. The bit pattern of a non-negative value has the same order as the values, so
+// that the digits of a pattern can be found one after the other.
+
+constexpr int kDigitBits = 16;
+constexpr int kKeyBits = 64;
+constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
+
+/// The leading bits of the result that are known so far.
+struct Prefix {
+  std::uint64_t bits = 0;
+  int unknown = kKeyBits;  ///< trailing bits still to be found
+
+  [[nodiscard]] bool matches(std::uint64_t key) const {
+    return unknown == kKeyBits || (key >> unknown) == bits;
+  }
+  [[nodiscard]] std::size_t nextDigit(std::uint64_t key) const {
+    return std::size_t(key >> (unknown - kDigitBits)) & (kDigits - 1);
+  }
+  void append(std::size_t digit) {
+    bits = bits << kDigitBits | digit;
+    unknown -= kDigitBits;
+  }
+};
+
+/// How many errors of the union of active voxels begin with the prefix, by their next digit.
+std::vector<std::uint64_t> countDigits(std::span<const BrickPair> pairs, const Prefix& prefix) {
+  using Range = tbb::blocked_range<std::size_t>;
+  using Histogram = std::vector<std::uint64_t>;
+  constexpr std::size_t kPairsPerTask = 4096;  // large, since a task's counters take 512 KB
+  return parallelReduce(
+      Range(0, pairs.size(), kPairsPerTask), Histogram(kDigits),
+      [&](const Range& range, Histogram counts) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+          for (int v = 0; v < kBrickVoxels; ++v) {
+            if (!pairs[i].isAnyActive(v)) continue;
+            const auto key = std::bit_cast<std::uint64_t>(std::abs(pairs[i].errorAt(v)));
+            if (prefix.matches(key)) ++counts[prefix.nextDigit(key)];
+          }
+        return counts;
+      },
+      [](Histogram a, const Histogram& b) {
+        for (std::size_t digit = 0; digit < kDigits; ++digit) a[digit] += b[digit];
+        return a;
+      });
+}
+
+}  // namespace
+
+double errorOfRank(std::span<const BrickPair> pairs, std::uint64_t rank) {
+  Prefix prefix;
+  while (prefix.unknown > 0) {
+    const std::vector<std::uint64_t> counts = countDigits(pairs, prefix);
+    std::size_t digit = 0;
+    while (counts[digit] < rank) rank -= counts[digit++];
+    prefix.append(digit);
+  }
+  return std::bit_cast<double>(prefix.bits);
+}
+
+std::uint64_t nearestRank(std::uint64_t count, std::uint64_t permille) {
+  constexpr std::uint64_t kThousand = 1000;
+  // ceil(count * permille / 1000) without overflow
+  const std::uint64_t whole = count / kThousand * permille;
+  const std::uint64_t rest = count % kThousand * permille;
+  return whole + (rest + kThousand - 1) / kThousand;
 }
 
 }  // namespace esvr::metrics

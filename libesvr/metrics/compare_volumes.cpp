@@ -1,48 +1,117 @@
+/// Errors of volumes against a reference. First come the sums over pairs of bricks, from which the
+/// metrics of two volumes are computed, then the metrics of vectors, of the change between two frames
+/// and of the signs of level sets.
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "core/parallel.h"
+#include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
+#include "esvr/sign_errors.h"
+#include "esvr/temporal_metrics.h"
+#include "esvr/vector_metrics.h"
 #include "metrics/brick_pairs.h"
-#include "metrics/error_sums.h"
-#include "metrics/order_statistic.h"
 
 namespace esvr {
+
 namespace {
 
 using metrics::Backgrounds;
 using metrics::BrickPair;
-using metrics::ErrorSums;
 
-constexpr std::uint64_t kP999Permille = 999;
+/// The box of the sums and the values outside bricks.
+struct ErrorDomain {
+  Box box;
+  Backgrounds backgrounds;
+};
 
-double choosePeak(const SparseVolume& reference, const CompareOptions& options) {
-  const double peak = options.peak ? *options.peak : peakOf(reference);
-  if (!(peak > 0.0) || !std::isfinite(peak))
-    throw UsageError("the peak must be positive, not " + std::to_string(peak));
-  return peak;
+struct ErrorSums {
+  // sums over the voxels of the bricks that lie in the box
+  double voxels = 0.0;
+  double squaredError = 0.0;
+  double massReference = 0.0, massCandidate = 0.0;
+  double maxError = -1.0;  ///< -1 before the first voxel
+  Coord maxErrorAt;
+
+  // sums over all bricks
+  double squaredErrorActive = 0.0;  ///< over the active voxels of the reference
+  std::uint64_t activeReference = 0, activeUnion = 0, activeIntersection = 0;
+  std::optional<Coord> nonFinite;  ///< the first voxel whose error is not a number or infinite
+
+  void keepLargest(double error, Coord at) {
+    if (error <= maxError) return;
+    maxError = error;
+    maxErrorAt = at;
+  }
+};
+
+ErrorSums sumsOfPair(const BrickPair& pair, const ErrorDomain& domain) {
+  ErrorSums sums;
+  const Box local = metrics::localBox(pair.brick, domain.box);
+  sums.voxels = local.volume();
+  for (int x = local.min.x; x <= local.max.x; ++x)
+    for (int y = local.min.y; y <= local.max.y; ++y)
+      for (int z = local.min.z; z <= local.max.z; ++z) {
+        const int v = voxelOffset({x, y, z});
+        const double error = pair.errorAt(v);
+        sums.squaredError += error * error;
+        sums.massReference += pair.referenceAt(v) - domain.backgrounds.reference;
+        sums.massCandidate += pair.candidateAt(v) - domain.backgrounds.candidate;
+        sums.keepLargest(std::abs(error), pair.voxelAt(v));
+      }
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const double error = pair.errorAt(v);
+    if (pair.isReferenceActive(v)) sums.squaredErrorActive += error * error;
+    if (!sums.nonFinite && !std::isfinite(error)) sums.nonFinite = pair.voxelAt(v);
+  }
+  static constexpr BrickMask kNone{};
+  const BrickMask& a = pair.referenceActive ? *pair.referenceActive : kNone;
+  const BrickMask& b = pair.candidateActive ? *pair.candidateActive : kNone;
+  sums.activeReference = std::uint64_t(a.count());
+  for (int word = 0; word < kBrickSide; ++word) {
+    sums.activeUnion += std::uint64_t(std::popcount(a.words[word] | b.words[word]));
+    sums.activeIntersection += std::uint64_t(std::popcount(a.words[word] & b.words[word]));
+  }
+  return sums;
 }
 
-Box chooseBox(const SparseVolume& reference, const CompareOptions& options) {
-  const Box box = options.box.value_or(activeBox(reference));
-  if (box.empty())
-    throw UsageError("the box from " + toString(box.min) + " to " + toString(box.max) +
-                     " has no voxel");
-  return box;
+/// Merges sums. `b` belongs to later bricks; of equal largest errors, the first voxel is kept.
+ErrorSums joined(ErrorSums a, const ErrorSums& b) {
+  a.voxels += b.voxels;
+  a.squaredError += b.squaredError;
+  a.massReference += b.massReference;
+  a.massCandidate += b.massCandidate;
+  a.keepLargest(b.maxError, b.maxErrorAt);
+  a.squaredErrorActive += b.squaredErrorActive;
+  a.activeReference += b.activeReference;
+  a.activeUnion += b.activeUnion;
+  a.activeIntersection += b.activeIntersection;
+  if (!a.nonFinite) a.nonFinite = b.nonFinite;
+  return a;
 }
 
-/// The next brick of a box in the order of Coord.
-Coord nextBrick(Coord brick, const Box& bricks) {
-  if (++brick.z <= bricks.max.z) return brick;
-  brick.z = bricks.min.z;
-  if (++brick.y <= bricks.max.y) return brick;
-  brick.y = bricks.min.y;
-  ++brick.x;
-  return brick;
+/// Sums in float64 by a tree that depends on the number of pairs only, so that the result is
+/// bit-identical for any number of threads.
+ErrorSums sumErrors(std::span<const BrickPair> pairs, const ErrorDomain& domain) {
+  using Range = tbb::blocked_range<std::size_t>;
+  constexpr std::size_t kPairsPerTask = 64;
+  return parallelDeterministicReduce(
+      Range(0, pairs.size(), kPairsPerTask), ErrorSums{},
+      [&](const Range& range, ErrorSums sums) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+          sums = joined(sums, sumsOfPair(pairs[i], domain));
+        return sums;
+      },
+      joined);
 }
 
 /// The first voxel of the box outside all pairs. The search makes at most one step for each pair,
@@ -53,34 +122,28 @@ Coord firstFreeVoxel(std::span<const BrickPair> pairs, const Box& box) {
   for (const BrickPair& pair : pairs) {
     if (!bricks.contains(pair.brick)) continue;
     if (pair.brick != place) break;
-    place = nextBrick(place, bricks);
+    if (++place.z <= bricks.max.z) continue;  // the next brick of the box in the order of Coord
+    place.z = bricks.min.z;
+    if (++place.y <= bricks.max.y) continue;
+    place.y = bricks.min.y;
+    ++place.x;
   }
   return maxCoord(place * kBrickSide, box.min);
 }
 
 /// Adds the voxels of the box that lie in no brick; their error is the backgrounds' difference.
-void addEmptySpace(ErrorSums& sums, std::span<const BrickPair> pairs,
-                   const metrics::ErrorDomain& domain) {
+void addEmptySpace(ErrorSums& sums, std::span<const BrickPair> pairs, const ErrorDomain& domain) {
   const double empty = domain.box.volume() - sums.voxels;
   const double error = std::abs(domain.backgrounds.reference - domain.backgrounds.candidate);
   if (empty < 1.0) return;
   sums.squaredError += empty * error * error;
-  if (error <= sums.maxError) return;
-  sums.maxError = error;
-  sums.maxErrorAt = firstFreeVoxel(pairs, domain.box);
-}
-
-void refuseNonFinite(const ErrorSums& sums, const Backgrounds& backgrounds) {
-  if (sums.nonFinite)
-    throw BadInput("the value at " + toString(*sums.nonFinite) + " is not finite");
-  if (!std::isfinite(backgrounds.reference) || !std::isfinite(backgrounds.candidate))
-    throw BadInput("the background is not finite");
+  if (error > sums.maxError) sums.keepLargest(error, firstFreeVoxel(pairs, domain.box));
 }
 
 /// Two volumes that are being compared.
 struct Comparison {
   double peak = 0.0;
-  metrics::ErrorDomain domain;
+  ErrorDomain domain;
   std::vector<BrickPair> pairs;
   ErrorSums sums;
 
@@ -91,33 +154,23 @@ Comparison compared(const SparseVolume& reference, const SparseVolume& candidate
                     const CompareOptions& options) {
   if (activeVoxelCount(reference) == 0) throw BadInput("the reference has no active voxel");
   Comparison c;
-  c.domain = {chooseBox(reference, options), {reference.background, candidate.background}};
+  c.domain = {options.box.value_or(activeBox(reference)),
+              {reference.background, candidate.background}};
+  const Box& box = c.domain.box;
+  if (box.empty())
+    throw UsageError("the box from " + toString(box.min) + " to " + toString(box.max) +
+                     " has no voxel");
   c.pairs = metrics::pairBricks(reference, candidate);
-  c.sums = metrics::sumErrors(c.pairs, c.domain);
-  refuseNonFinite(c.sums, c.domain.backgrounds);
-  c.peak = choosePeak(reference, options);
+  c.sums = sumErrors(c.pairs, c.domain);
+  if (c.sums.nonFinite)
+    throw BadInput("the value at " + toString(*c.sums.nonFinite) + " is not finite");
+  if (!std::isfinite(reference.background) || !std::isfinite(candidate.background))
+    throw BadInput("the background is not finite");
+  c.peak = options.peak ? *options.peak : peakOf(reference);
+  if (!(c.peak > 0.0) || !std::isfinite(c.peak))
+    throw UsageError("the peak must be positive, not " + std::to_string(c.peak));
   addEmptySpace(c.sums, c.pairs, c.domain);
   return c;
-}
-
-VolumeMetrics metricsOf(const Comparison& c) {
-  const ErrorSums& sums = c.sums;
-  VolumeMetrics m;
-  m.peak = c.peak;
-  m.boxVoxels = c.domain.box.volume();
-  m.activeVoxels = sums.activeReference;
-  m.mseBox = c.mseBox();
-  m.mseActive = sums.squaredErrorActive / double(sums.activeReference);
-  m.psnrBox = psnr(m.mseBox, m.peak);
-  m.psnrActive = psnr(m.mseActive, m.peak);
-  m.maxError = sums.maxError;
-  m.maxErrorAt = sums.maxErrorAt;
-  m.p999Error =
-      metrics::errorOfRank(c.pairs, metrics::nearestRank(sums.activeUnion, kP999Permille));
-  m.iou = double(sums.activeIntersection) / double(sums.activeUnion);
-  m.massReference = sums.massReference;
-  m.massCandidate = sums.massCandidate;
-  return m;
 }
 
 }  // namespace
@@ -138,8 +191,24 @@ double psnr(double mse, double peak) {
 
 VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& candidate,
                              const CompareOptions& options) {
+  constexpr std::uint64_t kP999Permille = 999;
   const Comparison c = compared(reference, candidate, options);
-  VolumeMetrics m = metricsOf(c);
+  const ErrorSums& sums = c.sums;
+  VolumeMetrics m;
+  m.peak = c.peak;
+  m.boxVoxels = c.domain.box.volume();
+  m.activeVoxels = sums.activeReference;
+  m.mseBox = c.mseBox();
+  m.mseActive = sums.squaredErrorActive / double(sums.activeReference);
+  m.psnrBox = psnr(m.mseBox, m.peak);
+  m.psnrActive = psnr(m.mseActive, m.peak);
+  m.maxError = sums.maxError;
+  m.maxErrorAt = sums.maxErrorAt;
+  m.p999Error =
+      metrics::errorOfRank(c.pairs, metrics::nearestRank(sums.activeUnion, kP999Permille));
+  m.iou = double(sums.activeIntersection) / double(sums.activeUnion);
+  m.massReference = sums.massReference;
+  m.massCandidate = sums.massCandidate;
   if (options.ssim) m.ssim = ssim3d(reference, candidate, c.domain.box, c.peak);
   return m;
 }
@@ -148,6 +217,95 @@ double psnrOverBox(const SparseVolume& reference, const SparseVolume& candidate,
                    const CompareOptions& options) {
   const Comparison c = compared(reference, candidate, options);
   return psnr(c.mseBox(), c.peak);
+}
+
+// Vectors.
+
+namespace {
+
+double peakOfLengths(const SparseVolume& lengths) {
+  const double longest = activeRange(lengths).max;
+  return longest > 0.0 ? longest : 1.0;
+}
+
+}  // namespace
+
+double peakOfVectors(const VectorVolume& reference) {
+  return peakOfLengths(magnitudeOf(reference));
+}
+
+double valueRangeOfVectors(const VectorVolume& reference) {
+  double largest = 0.0;
+  for (const SparseVolume& component : aligned(reference))
+    largest = std::max(largest, valueRangeOf(component));
+  return largest;
+}
+
+VectorMetrics compareVectors(const VectorVolume& reference, const VectorVolume& candidate,
+                             const CompareOptions& options) {
+  const VectorVolume a = aligned(reference), b = aligned(candidate);
+  const SparseVolume lengths = magnitudeOf(a);
+  CompareOptions same = options;
+  if (!same.peak) same.peak = peakOfLengths(lengths);
+  VectorMetrics metrics{compareVolumes(lengths, magnitudeOf(b), same), {}};
+  for (std::size_t c = 0; c < kComponents; ++c)
+    metrics.components[c] = compareVolumes(a[c], b[c], same);
+  return metrics;
+}
+
+// The change from a frame to the next.
+
+SparseVolume temporalDifference(const FramePair& frames) {
+  const auto pairs = metrics::pairBricks(frames.before, frames.after);
+  Coord first = pairs.empty() ? Coord{} : pairs.front().brick;
+  for (const BrickPair& pair : pairs) first = minCoord(first, pair.brick);
+  SparseVolume change;
+  change.values = VoxelArray<float>(memoryOf(frames.after));
+  change.origin = first * kBrickSide;
+  change.background = frames.after.background - frames.before.background;
+  change.values.resize(pairs.size() * kBrickVoxels);
+  for (std::size_t b = 0; b < pairs.size(); ++b) {
+    const BrickPair& pair = pairs[b];
+    BrickMask& active = change.active.emplace_back();
+    change.bricks.push_back(pair.brick - first);
+    const auto out = change.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (pair.isAnyActive(v)) active.set(v);
+      out[std::size_t(v)] = float(pair.candidateAt(v) - pair.referenceAt(v));
+    }
+  }
+  return change;
+}
+
+double temporalPsnr(const FramePair& reference, const FramePair& candidate,
+                    const CompareOptions& options) {
+  const bool before = activeVoxelCount(reference.before) > 0;
+  const bool after = activeVoxelCount(reference.after) > 0;
+  if (!before && !after) throw BadInput("the reference has no active voxel in two frames");
+  const SparseVolume expected = temporalDifference(reference);
+  CompareOptions own = options;
+  if (!own.box) own.box = activeBox(expected);
+  if (!own.peak)
+    own.peak =
+        std::max(before ? peakOf(reference.before) : 0.0, after ? peakOf(reference.after) : 0.0);
+  return psnrOverBox(expected, temporalDifference(candidate), own);
+}
+
+// Signs.
+
+SignErrors compareSigns(const SparseVolume& reference, const SparseVolume& candidate) {
+  const EmptySigns emptyReference(reference), emptyCandidate(candidate);
+  SignErrors errors;
+  for (const BrickPair& pair : metrics::pairBricks(reference, candidate)) {
+    const bool emptyA = !pair.reference && emptyReference.isInside(pair.brick);
+    const bool emptyB = !pair.candidate && emptyCandidate.isInside(pair.brick);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const bool a = pair.reference ? pair.reference[v] < 0.0f : emptyA;
+      const bool b = pair.candidate ? pair.candidate[v] < 0.0f : emptyB;
+      if (a != b && errors.voxels++ == 0) errors.first = pair.voxelAt(v);
+    }
+  }
+  return errors;
 }
 
 }  // namespace esvr

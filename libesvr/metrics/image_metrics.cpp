@@ -1,9 +1,13 @@
+/// Errors of pictures: PSNR, SSIM and the largest difference; and pictures that are made from pictures.
+
 #include "esvr/image_metrics.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include "core/parallel.h"
 #include "esvr/error.h"
@@ -173,6 +177,31 @@ Image sideBySide(std::span<const Image> images) {
       all.rgba.insert(all.rgba.end(), from, from + std::ptrdiff_t(ofRow));
     }
   return all;
+}
+
+Image meansOfSquares(const Image& image, int side) {
+  if (side < 1 || image.width % side != 0 || image.height % side != 0)
+    throw UsageError("a picture of " + std::to_string(image.width) + " x " +
+                     std::to_string(image.height) + " pixels has no squares with a side of " +
+                     std::to_string(side));
+  const auto offsetOf = [](const Image& picture, int x, int y) {
+    return kChannels * (std::size_t(y) * std::size_t(picture.width) + std::size_t(x));
+  };
+  Image means{image.width / side, image.height / side, {}};
+  means.rgba.resize(offsetOf(means, 0, means.height));
+  parallelFor(0, means.height, [&](int row) {
+    for (int column = 0; column < means.width; ++column) {
+      double sums[kChannels]{};
+      for (int y = row * side; y < (row + 1) * side; ++y)
+        for (int x = column * side; x < (column + 1) * side; ++x)
+          for (int c = 0; c < kChannels; ++c)
+            sums[c] += double(image.rgba[offsetOf(image, x, y) + std::size_t(c)]);
+      for (int c = 0; c < kChannels; ++c)
+        means.rgba[offsetOf(means, column, row) + std::size_t(c)] =
+            float(sums[c] / (double(side) * double(side)));
+    }
+  });
+  return means;
 }
 
 }  // namespace esvr

@@ -1,3 +1,5 @@
+/// The 3D SSIM of two volumes, brick by brick. Windows that cover backgrounds only are counted, not
+/// computed.
 
 #include <algorithm>
 #include <array>
@@ -21,8 +23,6 @@ namespace {
 
 using metrics::Backgrounds;
 using metrics::BrickPair;
-
-constexpr std::size_t kBricksPerTask = 16;
 
 /// Weighted moments of one window.
 struct Moments {
@@ -86,7 +86,6 @@ class SsimBrick {
 };
 
 void SsimBrick::gatherFrom(const BrickPair& pair, Coord brick) {
-  const metrics::PairValues values(pair);
   const Coord shift =
       (pair.brick - brick) * kBrickSide + Coord{kSsimRadius, kSsimRadius, kSsimRadius};
   Box local = metrics::localBox(pair.brick, scene_.box);
@@ -96,8 +95,8 @@ void SsimBrick::gatherFrom(const BrickPair& pair, Coord brick) {
     for (int y = local.min.y; y <= local.max.y; ++y)
       for (int z = local.min.z; z <= local.max.z; ++z) {
         const int from = voxelOffset({x, y, z});
-        const double a = values.reference(from) - scene_.backgrounds.reference;
-        const double b = values.candidate(from) - scene_.backgrounds.candidate;
+        const double a = pair.referenceAt(from) - scene_.backgrounds.reference;
+        const double b = pair.candidateAt(from) - scene_.backgrounds.candidate;
         if (a == 0.0 && b == 0.0) continue;
         const Coord at = Coord{x, y, z} + shift;
         const int to = haloOffset(at.x, at.y, at.z);
@@ -180,6 +179,7 @@ std::vector<Coord> bricksToVisit(std::span<const BrickPair> pairs, const Box& bo
 
 double sumExcess(std::span<const Coord> bricks, const SsimScene& scene) {
   using Range = tbb::blocked_range<std::size_t>;
+  constexpr std::size_t kBricksPerTask = 16;
   return parallelDeterministicReduce(
       Range(0, bricks.size(), kBricksPerTask), 0.0,
       [&](const Range& range, double sum) {

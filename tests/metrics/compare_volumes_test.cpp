@@ -1,7 +1,11 @@
 // Plan: (1) random sparse volumes are compared with plain dense float64 loops: the bricks of both
 // sides differ, the box cuts bricks, coordinates are negative, and backgrounds are not zero; (2)
 // results that are known in closed form; (3) the bits do not depend on the number of threads; (4)
-// the time depends on the bricks and not on the box; (5) scale, position, and refused input.
+// the time depends on the bricks and not on the box; (5) scale, position, and refused input; (6) the
+// metrics agree with those that scikit-image and numpy compute for the same voxels as arrays
+// (make_metrics_fixture.py; SSIM and FLIP have tests of their own).
+// The errors of vectors and of temporal differences are compared with figures that are computed by
+// hand, and the signs of level sets with voxels whose sign is changed.
 //
 // Tolerance of (1): sums of n < 5e4 float64 terms in two orders differ by less than n eps = 1e-11
 // of the sum of the terms' magnitudes. Squared errors are positive. Values are of order 1, so
@@ -10,18 +14,25 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "../fit/volumes.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
+#include "esvr/sign_errors.h"
+#include "esvr/temporal_metrics.h"
+#include "esvr/vector_metrics.h"
 #include "metrics/dense_reference.h"
 #include "metrics/volumes.h"
 #include "support/on_threads.h"
 
 namespace esvr {
+
 namespace {
 
 using test::movedBy;
@@ -292,5 +303,226 @@ TEST(Psnr, followsItsFormula) {
   EXPECT_NEAR(psnr(0.01, 255.0), 20.0 * std::log10(2550.0), 1e-12);
 }
 
+// Known answers. Float64 sums of 32^3 values below 1 are precise to 1e-10.
+
+constexpr int kSide = 32, kFirst = 10, kLast = 21;
+constexpr double kTolerance = 1e-10;
+
+/// The same function as in make_ssim_fixture.py.
+double hashed(std::uint64_t index) {
+  return double((index * 2654435761u % (std::uint64_t{1} << 32)) >> 8) / (1 << 24);
+}
+
+/// A block of values. Those above `activeAbove` are active.
+template <class ValueAt>
+SparseVolume block(float background, double activeAbove, const ValueAt& valueAt) {
+  const Box box{{kFirst, kFirst, kFirst}, {kLast, kLast, kLast}};
+  SparseVolume volume = test::volumeOf(
+      box,
+      [&](Coord v) { return float(valueAt(std::uint64_t((v.x * kSide + v.y) * kSide + v.z))); },
+      background);
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    BrickMask mask;
+    for (int i = 0; i < kBrickVoxels; ++i)
+      if (volume.active[b].test(i) && double(volume.brickValues(b)[i]) > activeAbove) mask.set(i);
+    volume.active[b] = mask;
+  }
+  return volume;
+}
+
+struct Known {
+  float background;
+  double massReference, massCandidate;
+};
+
+class KnownAnswers : public testing::TestWithParam<Known> {};
+
+TEST_P(KnownAnswers, agreeWithScikitImage) {
+  const Known& known = GetParam();
+  const auto reference = block(known.background, 1.0 / 3.0, hashed);
+  const auto candidate = block(known.background, 0.35, [](std::uint64_t i) {
+    return 0.75 * hashed(i) + 0.25 * hashed(i + 1000003);
+  });
+  const auto m = compareVolumes(reference, candidate,
+                                {.box = Box{{0, 0, 0}, {kSide - 1, kSide - 1, kSide - 1}},
+                                 .peak = 0.9986540079116821});  // the largest value
+  EXPECT_NEAR(m.psnrBox, 33.55627761263352, kTolerance);
+  EXPECT_NEAR(m.psnrActive, 27.994649501576674, kTolerance);
+  EXPECT_EQ(m.maxError, 0.2102183699607849);
+  EXPECT_EQ(m.p999Error, 0.2102183699607849);
+  EXPECT_NEAR(m.iou, 0.8934010152284264, kTolerance);
+  EXPECT_NEAR(m.massReference, known.massReference, kTolerance);
+  EXPECT_NEAR(m.massCandidate, known.massCandidate, kTolerance);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, KnownAnswers,
+                         testing::Values(Known{0.0f, 863.3728325366974, 863.1301729679108},
+                                         Known{0.25f, 431.3728325366974, 431.13017296791077}));
+
+// Vectors. All PSNR have the peak of the longest vector. A voxel that is active in one component counts
+// in all.
+
+/// A brick whose voxels all have this value.
+SparseVolume constant(float value) {
+  BrickInput brick{{}, {}, {}};
+  brick.values.fill(value);
+  brick.active.setAll();
+  return makeVolume({brick}, 0.0f);
+}
+
+VectorVolume constants(float x, float y, float z) {
+  return {constant(x), constant(y), constant(z)};
+}
+
+TEST(CompareVectors, MeasuresLengthsAndComponentsWithOnePeak) {
+  const VectorMetrics m = compareVectors(constants(3, -4, 0), constants(3, -4.5, 0));
+  EXPECT_DOUBLE_EQ(m.magnitude.peak, 5.0);
+  EXPECT_DOUBLE_EQ(m.components[1].peak, 5.0);
+  EXPECT_TRUE(std::isinf(m.components[0].psnrBox));
+  EXPECT_NEAR(m.components[1].psnrBox, 20.0, 1e-9);  // 0.5 of 5; float64 rounding
+  const double error = std::sqrt(9.0 + 4.5 * 4.5) - 5.0;
+  // The lengths are rounded to float32, whose steps are 5e-7 at 5.
+  EXPECT_NEAR(m.magnitude.maxError, error, 1e-6);
+}
+
+TEST(CompareVectors, CountsVoxelsThatAreActiveInOneComponent) {
+  VectorVolume reference = constants(1, 0, 0), candidate = reference;
+  candidate[1] = candidate[2] = SparseVolume{};
+  const VectorMetrics m = compareVectors(reference, candidate);
+  EXPECT_EQ(m.components[1].iou, 1.0);
+  EXPECT_TRUE(std::isinf(m.magnitude.psnrBox));
+}
+
+TEST(CompareVectors, TakesAGivenPeak) {
+  const VectorMetrics m = compareVectors(constants(0, 0, 0), constants(0, 0, 1), {.peak = 10.0});
+  EXPECT_NEAR(m.components[2].psnrActive, 20.0, 1e-9);  // float64 rounding
+}
+
+TEST(CompareVectors, HaveAPeakThatIsPositive) {
+  EXPECT_DOUBLE_EQ(peakOfVectors(constants(-3, 0, 4)), 5.0);
+  EXPECT_DOUBLE_EQ(peakOfVectors(constants(0, 0, 0)), 1.0);
+}
+
+TEST(CompareVectors, HaveAPeakThatDoesNotFallWithTheRangeOfTheirLengths) {
+  VectorVolume vectors = constants(3, 4, 0);
+  vectors[1].values[0] = 3.9f;
+  EXPECT_DOUBLE_EQ(peakOfVectors(vectors), 5.0);
+}
+
+TEST(CompareVectors, HaveOneRangeWhichIsTheLargestOfAComponent) {
+  VectorVolume vectors = constants(3, 4, 0);
+  vectors[1].values[0] = -1.0f;
+  vectors[2].values[0] = 2.0f;
+  EXPECT_DOUBLE_EQ(valueRangeOfVectors(vectors), 5.0);
+  EXPECT_DOUBLE_EQ(valueRangeOfVectors(constants(1, 1, 1)), 0.0);
+}
+
+// Temporal differences. Errors that both frames share must not count; errors that change must.
+
+// All values are multiples of 1/8 below 16, so that sums are exact; the rest is rounding of
+// logarithms in float64.
+constexpr double kRounding = 1e-9;
+
+const Box kCube{{-3, 2, 5}, {12, 9, 14}};
+
+SparseVolume filled(float value, const Box& box = kCube) {
+  return volumeOf(box, [&](Coord) { return value; });
+}
+
+TEST(TemporalPsnr, IsInfiniteWhereBothFramesHaveTheSameError) {
+  const SparseVolume before = filled(2), after = filled(4);
+  const SparseVolume worse = filled(2.5), worseAfter = filled(4.5);
+  EXPECT_TRUE(std::isinf(temporalPsnr({before, after}, {before, after})));
+  EXPECT_TRUE(std::isinf(temporalPsnr({before, after}, {worse, worseAfter})));
+}
+
+TEST(TemporalPsnr, HasTheErrorOfTheChange) {
+  const SparseVolume before = filled(2), after = filled(4);
+  const SparseVolume low = filled(1.75), high = filled(4.25);
+  // The change has an error of 0.5 everywhere, and the peak is 4.
+  EXPECT_NEAR(temporalPsnr({before, after}, {low, high}), 20 * std::log10(4 / 0.5), kRounding);
+  EXPECT_NEAR(temporalPsnr({before, after}, {low, high}, {.peak = 8.0}), 20 * std::log10(8 / 0.5),
+              kRounding);
+}
+
+TEST(TemporalPsnr, IsMeasuredOverTheVoxelsOfBothFrames) {
+  // The reference moves from one cube to another of the same size; the candidate is not in the
+  // second frame, so that half of the box has an error of 4.
+  const SparseVolume before = filled(4), after = filled(4, {{13, 2, 5}, {28, 9, 14}});
+  const SparseVolume gone{};
+  EXPECT_NEAR(temporalPsnr({before, after}, {before, gone}), 10 * std::log10(2.0), kRounding);
+}
+
+TEST(TemporalPsnr, TakesAnEmptyFrame) {
+  const SparseVolume empty{}, full = filled(4), half = filled(2);
+  EXPECT_NEAR(temporalPsnr({empty, full}, {empty, half}), 20 * std::log10(2.0), kRounding);
+  EXPECT_NEAR(temporalPsnr({full, empty}, {half, empty}), 20 * std::log10(2.0), kRounding);
+  EXPECT_THROW((void)temporalPsnr({empty, empty}, {full, full}), BadInput);
+}
+
+TEST(TemporalDifference, IsTheSameVoxelByVoxel) {
+  const SparseVolume before = test::randomVolume({.seed = 1, .background = 0.5f});
+  const SparseVolume after = test::randomVolume({.seed = 2, .background = 0.25f});
+  const SparseVolume change = temporalDifference({before, after});
+  checkInvariants(change);
+  EXPECT_EQ(change.background, -0.25f);
+  for (int x = -20; x < 20; ++x)
+    for (int y = -20; y < 20; ++y)
+      for (int z = -20; z < 20; ++z) {
+        const Coord at{x, y, z};
+        // The difference of two float32 numbers in float64 is rounded once.
+        ASSERT_EQ(valueAt(change, at), float(double(valueAt(after, at)) - valueAt(before, at)));
+      }
+}
+
+// Signs. Each voxel whose sign is changed is counted, active or not, and 0 counts as outside. A brick that
+// only one volume has is compared with the sign of the empty space of the other one.
+
+TEST(CompareSigns, CountsEveryVoxelOnTheWrongSide) {
+  const SparseVolume band = test::levelSetVolume();
+  SparseVolume other = band;
+  EXPECT_EQ(compareSigns(band, other).voxels, 0u);
+  EXPECT_FALSE(compareSigns(band, other).first);
+  std::size_t flipped = 0;
+  for (std::size_t i = 0; i < other.values.size(); i += 1001, ++flipped)
+    other.values[i] = band.values[i] < 0.0f ? 0.0f : -0.5f;
+  const SignErrors errors = compareSigns(band, other);
+  EXPECT_EQ(errors.voxels, flipped);
+  EXPECT_EQ(errors.first, band.brickCorner(0));
+}
+
+TEST(CompareSigns, IgnoresTheMagnitude) {
+  const SparseVolume band = test::levelSetVolume();
+  SparseVolume other = band;
+  for (float& v : other.values) v = v < 0.0f ? -1e-30f : 0.0f;
+  EXPECT_EQ(compareSigns(band, other).voxels, 0u);
+}
+
+TEST(CompareSigns, KnowsTheSideOfEmptySpace) {
+  const SparseVolume band = test::levelSetVolume();
+  const auto with = [&](Coord place, float value) {
+    std::vector<BrickInput> bricks(1);
+    bricks[0].corner = place * kBrickSide;
+    bricks[0].values.fill(value);
+    bricks[0].active.setAll();
+    for (std::size_t b = 0; b < band.brickCount(); ++b) {
+      BrickInput own{band.brickCorner(b), {}, band.active[b]};
+      std::ranges::copy(band.brickValues(b), own.values.begin());
+      bricks.push_back(own);
+    }
+    return makeVolume(std::move(bricks), band.background);
+  };
+  const Coord inside{2, 2, 2}, outside{-1, 2, 2};
+  for (const auto& [brick, value, errors] :
+       {std::tuple{inside, -1.0f, 0u}, std::tuple{inside, 1.0f, 512u},
+        std::tuple{outside, 1.0f, 0u}, std::tuple{outside, -1.0f, 512u}}) {
+    const SparseVolume more = with(brick, value);
+    ASSERT_EQ(more.brickCount(), band.brickCount() + 1);
+    EXPECT_EQ(compareSigns(band, more).voxels, errors);
+    EXPECT_EQ(compareSigns(more, band).voxels, errors);
+  }
+}
+
 }  // namespace
+
 }  // namespace esvr

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the figures that known_answers_test.cpp compares with, by scikit-image and numpy.
+"""Prints the figures that compare_volumes_test.cpp compares with, by scikit-image and numpy.
 
 Needs numpy and scikit-image (Debian: python3-skimage; the values in the test are of 0.19.3). The
 volumes are those of make_ssim_fixture.py: a 12^3 block of hashed values in a 32^3 box of background.

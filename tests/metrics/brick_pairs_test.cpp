@@ -1,7 +1,7 @@
 // Plan: the selection by digits agrees with sorting for errors of all magnitudes, and ranks with
 // counting.
 
-#include "metrics/order_statistic.h"
+#include "metrics/brick_pairs.h"
 
 #include <gtest/gtest.h>
 
