@@ -1,5 +1,6 @@
 #pragma once
-/// The inner loops over one pair of an ellipsoid and a brick. They are compiled once for each
+/// The inner loops over one pair of an ellipsoid and a brick, or of an ellipsoid and places in a brick.
+/// They are compiled once for each
 /// instruction set and chosen at run time. A SIMD vector holds a row of eight voxels along z, and
 /// the loop runs along y. In the line form of an ellipsoid (line_form.h), m then takes one
 /// multiply-add for each row.
@@ -60,5 +61,25 @@ struct BrickKernels {
 
 /// The kernels for the best instruction set of this processor.
 [[nodiscard]] const BrickKernels& brickKernels();
+
+/// Places in a brick, relative to its first voxel. The arrays are 64-byte aligned.
+struct PlaceBlock {
+  static constexpr int kMultiple = 16;  ///< `count` is a multiple of it, which fills all registers
+
+  const float *x, *y, *z;
+  int count;
+};
+
+/// Adds intensity * phi to the sum of each place. This is not one of the BrickKernels, so that a program
+/// that evaluates no places does not contain the loop.
+/// \param corner  first voxel of the brick, in the frame of f.center
+using AddPlaces = void (*)(const LineForm& f, const float corner[3],
+                           const KernelConstants<float>& k, const PlaceBlock& places, float* sum);
+
+/// The loops for all instruction sets that this processor has, in the order of runnableKernels().
+[[nodiscard]] std::vector<AddPlaces> runnablePlaceKernels();
+
+/// The loop for the best instruction set of this processor.
+[[nodiscard]] AddPlaces placeKernel();
 
 }  // namespace esvr

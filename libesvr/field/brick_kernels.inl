@@ -6,8 +6,8 @@
 // for two rows) and ESVR_KERNEL_NATIVE (floats in a register: ESVR_KERNEL_LANES or half of it).
 
 #include "field/brick_kernels.h"
-#include "field/line_math.h"
-#include "field/place_kernels.h"
+#include "field/line_form.h"
+#include "field/ssim_window.h"
 
 namespace esvr::ESVR_KERNEL_NAMESPACE {
 namespace {
@@ -288,11 +288,37 @@ void addPlaces(const LineForm& f, const float corner[3], const KernelConstants<f
   }
 }
 
+// The loops of SSIM. The compiler vectorises the loops over i.
+
+/// One window sum. The window is symmetric, so two voxels share a multiplication.
+inline double sumAt(const double* weights, const double* in, int stride) {
+  double sum = weights[kSsimRadius] * in[kSsimRadius * stride];
+  for (int tap = 0; tap < kSsimRadius; ++tap)
+    sum += weights[tap] * (in[tap * stride] + in[(kSsimTaps - 1 - tap) * stride]);
+  return sum;
+}
+
+void sumTaps(const double* weights, const double* in, int stride, double* __restrict out,
+             int count) {
+  for (int i = 0; i < count; ++i) out[i] = sumAt(weights, in + i, stride);
+}
+
+void sumRows(const double* weights, const double* in, double* __restrict out, int rows) {
+  for (int row = 0; row < rows; ++row, in += kHaloSide, out += kBrickSide)
+    for (int i = 0; i < kBrickSide; ++i) out[i] = sumAt(weights, in + i, 1);
+}
+
+void multiply(const double* a, const double* b, double* __restrict product, int count) {
+  for (int i = 0; i < count; ++i) product[i] = a[i] * b[i];
+}
+
 }  // namespace
 
 extern const BrickKernels kKernels;
 const BrickKernels kKernels{ESVR_KERNEL_NAME, add, forward, backward, addTape, projectTape};
 extern const AddPlaces kAddPlaces;
 const AddPlaces kAddPlaces = addPlaces;
+extern const SsimKernels kSsimKernels;
+const SsimKernels kSsimKernels{ESVR_KERNEL_NAME, sumTaps, sumRows, multiply};
 
 }  // namespace esvr::ESVR_KERNEL_NAMESPACE

@@ -5,17 +5,143 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <unordered_map>
 #include <utility>
 
+#include "core/brick_hash.h"
 #include "core/parallel.h"
-#include "field/brick_set.h"
-#include "field/brick_walk.h"
-#include "field/offsets.h"
+#include "esvr/error.h"
+#include "esvr/sparse_volume.h"
 
 namespace esvr {
 namespace {
 
-using Range = tbb::blocked_range<std::size_t>;
+using EllipsoidRange = tbb::blocked_range<std::size_t>;
+
+/// A set of bricks, which are stored as bits in blocks of 8^3 bricks. Its memory follows the number
+/// of blocks, however often a brick is inserted.
+class BrickSet {
+ public:
+  void insert(Coord brick) {
+    BrickMask& block = blockAt(brickOf(brick));
+    const int bit = voxelOffset(localOf(brick));
+    if (block.test(bit)) return;
+    block.set(bit);
+    ++size_;
+  }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+  /// Appends all bricks to a list, in any order.
+  void appendTo(std::vector<Coord>& list) const {
+    for (const auto& [place, block] : blocks_)
+      for (int bit = 0; bit < kBrickVoxels; ++bit)
+        if (block.test(bit)) list.push_back(place * kBrickSide + voxelLocal(bit));
+  }
+
+ private:
+  struct HashOfBrick {
+    std::size_t operator()(Coord brick) const { return std::size_t(hashOf(brick)); }
+  };
+
+  /// Bricks that follow each other mostly lie in the same block.
+  BrickMask& blockAt(Coord place) {
+    if (last_ == nullptr || place != lastPlace_) {
+      last_ = &blocks_[place];  // stays where it is when others are added
+      lastPlace_ = place;
+    }
+    return *last_;
+  }
+
+  std::unordered_map<Coord, BrickMask, HashOfBrick> blocks_;
+  BrickMask* last_ = nullptr;
+  Coord lastPlace_;
+  std::uint64_t size_ = 0;
+};
+
+double determinant(const Matrix3& m) {
+  return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+         m[2] * (m[3] * m[7] - m[4] * m[6]);
+}
+
+/// The bricks' middles lie between three pairs of planes (SlabTest). Around each middle lies a cube
+/// as large as a brick, and the cubes do not overlap: their number is bounded by the volume between
+/// planes that are moved outwards by half a brick.
+double bricksBetweenSlabs(const Support& s) {
+  constexpr double kHalf = kBrickSide / 2.0, kBrickVolume = kBrickVoxels;
+  double volume = 8.0 / std::abs(determinant(s.L));
+  for (int j = 0; j < 3; ++j) {
+    const double* row = &s.L[3 * j];
+    const double reach = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
+    volume *= slabBound(s, j) + kHalf * reach;
+  }
+  return volume / kBrickVolume;
+}
+
+}  // namespace
+
+double maxBricks(const Support& support, const Box& within) {
+  const double boxed = common(brickRange(support), within).volume();
+  const double slabs = bricksBetweenSlabs(support);
+  return slabs < boxed ? slabs : boxed;
+}
+
+double countBricks(std::span<const Support> supports, const Box& within, double enough) {
+  constexpr std::int32_t kSlice = 64;  // bricks along x between two checks of the count
+  BrickSet set;
+  for (const Support& support : supports) {
+    Box left = common(brickRange(support), within);
+    for (; !left.empty() && double(set.size()) <= enough; left.min.x += kSlice) {
+      Box slice = left;
+      slice.max.x = std::min(left.max.x, left.min.x + kSlice - 1);
+      forEachReachedBrick(support, slice, [&](Coord brick) { set.insert(brick); });
+    }
+  }
+  return double(set.size());
+}
+
+void requireListable(std::span<const Support> supports, const Box& within) {
+  constexpr double kMaxListed = 0x1p32;
+  double bricks = 0.0;
+  for (const Support& support : supports) bricks += maxBricks(support, within);
+  if (bricks > kMaxListed)
+    throw MemoryExceeded("the ellipsoids reach up to " + std::to_string(bricks) +
+                         " bricks, more than 2^32");
+}
+
+std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
+                                 const SupportOf& supportOf, const Box& within) {
+  tbb::enumerable_thread_specific<BrickSet> found;
+  parallelFor(EllipsoidRange(0, ellipsoids, 64), [&](const EllipsoidRange& range) {
+    auto& mine = found.local();
+    for (std::size_t i = range.begin(); i != range.end(); ++i)
+      forEachReachedBrick(supportOf(i), within, [&](Coord brick) {
+        if (index.find(brick) == BrickIndex::kNone) mine.insert(brick);
+      });
+  });
+  std::vector<Coord> all;
+  for (const BrickSet& part : found) part.appendTo(all);
+  tbb::parallel_sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
+}
+
+void makeOffsets(std::vector<std::uint32_t>& lengths) {
+  constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max();
+  std::uint64_t sum = 0;
+  for (std::uint32_t& length : lengths) {
+    const std::uint64_t begin = sum;
+    sum += length;
+    length = std::uint32_t(begin);
+  }
+  if (sum > kMax)
+    throw RuntimeFailure("there are " + std::to_string(sum) +
+                         " pairs of an ellipsoid and a brick, more than the " +
+                         std::to_string(kMax) + " that lists hold");
+}
+
+namespace {
 
 /// Calls visit(number) for the bricks of an index that a support may touch, in the order of their
 /// coordinates. It searches the bricks around the support or those of the index, whichever is
@@ -43,7 +169,7 @@ void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit)
 template <class Visit>
 void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf& supportOf,
                 Visit&& visit) {
-  parallelFor(Range(0, ellipsoids, 64), [&](const Range& range) {
+  parallelFor(EllipsoidRange(0, ellipsoids, 64), [&](const EllipsoidRange& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       std::uint32_t n = 0;
       forEachPair(index, supportOf(i), [&](std::uint32_t b) { visit(i, n++, b); });
@@ -134,21 +260,12 @@ BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
   return pairs;
 }
 
-std::vector<Coord> missingBricks(const BrickIndex& index, std::size_t ellipsoids,
-                                 const SupportOf& supportOf, const Box& within) {
-  tbb::enumerable_thread_specific<BrickSet> found;
-  parallelFor(Range(0, ellipsoids, 64), [&](const Range& range) {
-    auto& mine = found.local();
-    for (std::size_t i = range.begin(); i != range.end(); ++i)
-      forEachReachedBrick(supportOf(i), within, [&](Coord brick) {
-        if (index.find(brick) == BrickIndex::kNone) mine.insert(brick);
-      });
-  });
-  std::vector<Coord> all;
-  for (const BrickSet& part : found) part.appendTo(all);
-  tbb::parallel_sort(all.begin(), all.end());
-  all.erase(std::unique(all.begin(), all.end()), all.end());
-  return all;
+BrickPairs pairsWith(std::span<const Support> reach, std::span<const Coord> corners) {
+  std::vector<Coord> bricks;
+  bricks.reserve(corners.size());
+  for (const Coord corner : corners) bricks.push_back(brickOf(corner));
+  return pairsWithin(BrickIndex(bricks), reach.size(),
+                     [&](std::size_t i) -> const Support& { return reach[i]; });
 }
 
 }  // namespace esvr

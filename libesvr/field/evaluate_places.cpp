@@ -1,3 +1,5 @@
+/// The evaluation of a field at any places. They are sorted by bricks in groups, and the places of a brick
+/// are evaluated in blocks that fill the registers.
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +8,8 @@
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "field/evaluate_plan.h"
-#include "field/place_kernels.h"
+#include "field/brick_kernels.h"
+#include "field/evaluate.h"
 
 namespace esvr {
 namespace {

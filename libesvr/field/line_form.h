@@ -33,18 +33,6 @@ struct LineForm {
   float intensity;
 };
 
-/// \param L       maps displacements to the unit frame
-/// \param radius  radius of the support in the unit frame (supportRadius)
-[[nodiscard]] ESVR_HD inline LineForm makeLineForm(const std::array<double, 3>& center,
-                                                   const Matrix3& L, double radius,
-                                                   double intensity);
-
-/// The matrix L = S^-1 R^T of ellipsoid i, which maps a displacement d to u = L d.
-[[nodiscard]] Matrix3 unitFrame(const Ellipsoids& e, std::size_t i);
-
-/// The inverse F = L^-1. Its columns are the axes times their scales, up to a rotation.
-[[nodiscard]] ESVR_HD inline Matrix3 inverse(const Matrix3& L);
-
 /// Sigma_ij, which is the product of the rows i and j of F.
 [[nodiscard]] ESVR_HD inline double sigma(const Matrix3& F, int i, int j) {
   return F[3 * i] * F[3 * j] + F[3 * i + 1] * F[3 * j + 1] + F[3 * i + 2] * F[3 * j + 2];
@@ -74,7 +62,8 @@ ESVR_HD inline double conditionalSigmaY(const Vec3& ly, const Vec3& lz) {
 
 }  // namespace line_form
 
-ESVR_HD inline Matrix3 inverse(const Matrix3& m) {
+/// The inverse F = L^-1. Its columns are the axes times their scales, up to a rotation.
+[[nodiscard]] ESVR_HD inline Matrix3 inverse(const Matrix3& m) {
   const double c00 = m[4] * m[8] - m[5] * m[7], c01 = m[5] * m[6] - m[3] * m[8],
                c02 = m[3] * m[7] - m[4] * m[6];
   const double s = 1.0 / (m[0] * c00 + m[1] * c01 + m[2] * c02);
@@ -83,8 +72,11 @@ ESVR_HD inline Matrix3 inverse(const Matrix3& m) {
           c02 * s, (m[1] * m[6] - m[0] * m[7]) * s, (m[0] * m[4] - m[1] * m[3]) * s};
 }
 
-ESVR_HD inline LineForm makeLineForm(const std::array<double, 3>& center, const Matrix3& L,
-                                     double radius, double intensity) {
+/// \param L       maps displacements to the unit frame
+/// \param radius  radius of the support in the unit frame (supportRadius)
+[[nodiscard]] ESVR_HD inline LineForm makeLineForm(const std::array<double, 3>& center,
+                                                   const Matrix3& L, double radius,
+                                                   double intensity) {
   using namespace line_form;
   const Vec3 lx = columnOf(L, 0), ly = columnOf(L, 1), lz = columnOf(L, 2);
   const double a = dot(ly, ly), cx = dot(lx, ly) / a, cz = dot(lz, ly) / a;
@@ -101,6 +93,45 @@ ESVR_HD inline LineForm makeLineForm(const std::array<double, 3>& center, const 
   f.halfYx = float(radius * conditionalSigmaY(ly, lz));
   f.intensity = float(intensity);
   return f;
+}
+
+/// The matrix L = S^-1 R^T of ellipsoid i, which maps a displacement d to u = L d.
+[[nodiscard]] inline Matrix3 unitFrame(const Ellipsoids& e, std::size_t i) {
+  const Quaternion q{e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]};
+  const Matrix3 R = rotationOf(normalised(q));
+  Matrix3 L;
+  for (int r = 0; r < 3; ++r) {
+    const double inv = std::exp(-double(e.logScale[r][i]));
+    for (int c = 0; c < 3; ++c) L[3 * r + c] = inv * R[3 * c + r];
+  }
+  return L;
+}
+
+// The math for each voxel, which gives m. It serves SIMD vectors and CUDA: T is float or a vector of
+// floats, and so is X, the type of dx, which is the same for all voxels of a line. The functions are
+// static, so that each translation unit keeps its own copy for its instruction set. Otherwise the
+// linker could keep one copy for all of them.
+
+/// m at the point of the line (dx, dz) that is closest to the center. No voxel of the line has a
+/// smaller m.
+/// \param pzDz  pz * dz
+template <class T, class X>
+ESVR_HD static inline T closestSquared(const LineForm& f, X dx, const T (&pzDz)[3]) {
+  const T u0 = pzDz[0] + dx * f.px[0], u1 = pzDz[1] + dx * f.px[1], u2 = pzDz[2] + dx * f.px[2];
+  return u0 * u0 + u1 * u1 + u2 * u2;
+}
+
+/// The distance t from the closest point to y.
+/// \param centerY  y of the center, in the frame of y
+template <class T, class X>
+ESVR_HD static inline T distanceAlong(const LineForm& f, T y, float centerY, X dx, T dz) {
+  return y - (dx * f.sx + centerY) - dz * f.sz;
+}
+
+/// m at t. \param closest  m at the closest point
+template <class T>
+ESVR_HD static inline T squaredAt(const LineForm& f, T closest, T t) {
+  return closest + f.a * t * t;
 }
 
 }  // namespace esvr

@@ -1,15 +1,73 @@
 #pragma once
-/// The sum of ellipsoids on a brick in float64, by its definition, and what its evaluation in float32
-/// may do.
+/// The sum of ellipsoids on a brick in float64, by its definition, and bounds on the errors of its
+/// evaluation in float32.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include "esvr/ellipsoids.h"
+#include "esvr/kernel.h"
 #include "esvr/sparse_volume.h"
 #include "esvr/stability.h"
+#include "field/line_form.h"
+
+/// docs/math.md, "Rounding", counts the operations from which the constants follow.
+namespace esvr::rounding {
+
+inline constexpr double kUnit = 0x1p-24;  ///< largest relative error of one operation
+
+/// The number of roundings, each of one unit, in the parts of an evaluation.
+inline constexpr double kOfPosition = 24.0, kOfSquare = 8.0, kOfExponent = 4.0, kOfQuotient = 14.0,
+                        kOfTerm = 2.0;
+/// Voxels between a voxel and the frame of its brick, or of the first row.
+inline constexpr double kFrame = 8.0;
+
+/// The lengths of the columns of L, by which the components of a displacement are multiplied.
+struct ColumnLengths {
+  double x, y, z;
+};
+[[nodiscard]] inline ColumnLengths columnLengths(const Matrix3& L) {
+  const auto length = [&](int c) { return std::hypot(L[c], L[3 + c], L[6 + c]); };
+  return {length(0), length(1), length(2)};
+}
+
+/// Bound of the error of m. \param d  displacement of the voxel from the center
+[[nodiscard]] inline double ofM(const ColumnLengths& columns, const double (&d)[3], double m) {
+  const double products = columns.x * (std::abs(d[0]) + kFrame) +
+                          columns.y * (std::abs(d[1]) + kFrame) +
+                          columns.z * (std::abs(d[2]) + kFrame);
+  const double ofU = kOfPosition * kUnit * products;
+  return 2.0 * std::sqrt(m) * ofU + ofU * ofU + kOfSquare * kUnit * m;
+}
+
+/// |phi'| of the continuous form, inside and outside of the support. \param m  not negative
+[[nodiscard]] inline double slopeAt(const KernelConstants<double>& k, double m) {
+  const double quotient = k.numerator / (k.plateau + std::exp(m - k.shift));
+  return quotient * (1.0 - quotient * k.slope);
+}
+
+/// The largest |phi'| between two values of m. It is largest at m = kappa, where e^(m - s) = B.
+[[nodiscard]] inline double steepest(const KernelConstants<double>& k, double from, double to) {
+  const double kappa = k.shift + std::log(k.plateau);
+  const double ends = std::max(slopeAt(k, from), slopeAt(k, to));
+  return from < kappa && kappa < to ? std::max(ends, slopeAt(k, kappa)) : ends;
+}
+
+/// Bound of the error of phi. \param ofM  bound of the error of m
+[[nodiscard]] inline double ofPhi(const KernelConstants<double>& k, double m, double ofM) {
+  const double error = ofM + kUnit * (k.shift + kOfExponent * std::abs(m - k.shift));
+  if (m > k.cutoff + error) return 0.0;  // outside the support in either arithmetic
+  const double from = std::max(m - error, 0.0), to = std::min(m + error, k.cutoff + error);
+  const double phi = kernelPhi(k, m);
+  // The paper's kernel jumps where the support ends.
+  const double jump = m + error < k.cutoff ? 0.0 : kernelPhi(k, std::nextafter(k.cutoff, 0.0));
+  return steepest(k, from, to) * error + kOfQuotient * kUnit * (phi + k.base) + jump;
+}
+
+}  // namespace esvr::rounding
 
 namespace esvr {
 
@@ -42,5 +100,9 @@ class ReferenceField {
   const Field& field_;
   std::vector<Box> boxes_;  ///< bounding boxes of the supports, index coordinates
 };
+
+/// The voxels nearest to the centers of the ellipsoids with the smallest and the largest scale, the
+/// largest aspect ratio and the largest intensity.
+[[nodiscard]] std::vector<Coord> centersOfExtremes(const Field& field);
 
 }  // namespace esvr

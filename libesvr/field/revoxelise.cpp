@@ -1,26 +1,61 @@
+/// Converts fields to voxels: the region of each brick in which voxels may be active, its voxels, and the
+/// volume of all bricks.
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "field/active_region.h"
-#include "field/brick_batches.h"
+#include "field/evaluate.h"
 #include "field/voxel_rule.h"
 
 namespace esvr {
-namespace {
 
-Coord smallest(std::span<const Coord> corners) {
-  Coord low = corners.front();
-  for (const Coord c : corners) low = minCoord(low, c);
-  return low;
+BrickMask maskOf(const Box& box, Coord corner) {
+  const LocalBox local = localBox(box, corner, kBrickSide - 1);
+  BrickMask mask;
+  for (int x = local.low[0]; x <= local.high[0]; ++x)
+    for (int y = local.low[1]; y <= local.high[1]; ++y)
+      for (int z = local.low[2]; z <= local.high[2]; ++z) mask.set(voxelOffset({x, y, z}));
+  return mask;
 }
 
-void refuseTooFarApart(Coord low, std::span<const Coord> corners) {
+BrickRegion regionIn(const RevoxeliseOptions& options, Coord corner) {
+  const BrickMask inBox = maskOf(options.box, corner);
+  if (!options.restrictToBricks) return {inBox, true};
+  const auto at = std::lower_bound(options.bricks.begin(), options.bricks.end(), corner);
+  if (at == options.bricks.end() || *at != corner) return {};
+  const auto place = std::size_t(at - options.bricks.begin());
+  if (!options.levels.empty()) return {inBox, true, &options.levels[place]};
+  if (options.masks.empty()) return {inBox, true};
+  BrickRegion region{inBox, false};
+  for (std::size_t w = 0; w < inBox.words.size(); ++w)
+    region.within.words[w] &= options.masks[place].words[w];
+  return region;
+}
+
+BrickMask settle(const VoxelRule& rule, const BrickRegion& region, std::span<float> values) {
+  BrickMask mask;
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    values[v] = rule.settled(values[v]);
+    if (region.isActive(rule, v, values[v]))
+      mask.set(v);
+    else
+      values[v] = rule.inactiveValue(values[v]);
+  }
+  return mask;
+}
+
+namespace {
+
+/// The lowest corner of a box around all bricks.
+Coord lowestCorner(std::span<const Coord> corners) {
   constexpr std::int64_t kMaxExtent = std::int64_t{Box::kMax} - kBrickSide;
+  Coord low = corners.front();
+  for (const Coord c : corners) low = minCoord(low, c);
   for (const Coord c : corners) {
     const auto extent =
         std::max({std::int64_t(c.x) - low.x, std::int64_t(c.y) - low.y, std::int64_t(c.z) - low.z});
@@ -28,6 +63,7 @@ void refuseTooFarApart(Coord low, std::span<const Coord> corners) {
       throw RuntimeFailure("the ellipsoids reach the voxels " + toString(low) + " and " +
                            toString(c) + ", which are 2^31 voxels or more apart");
   }
+  return low;
 }
 
 SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
@@ -37,8 +73,7 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
   volume.background = field.background;
   volume.values = VoxelArray<float>(options.memory);
   if (corners.empty()) return volume;
-  volume.origin = smallest(corners);
-  refuseTooFarApart(volume.origin, corners);
+  volume.origin = lowestCorner(corners);
   std::vector<BrickMask> masks(std::min(kBatchBricks, corners.size()));
   volume.values.reserve(corners.size() * kBrickVoxels);
   forEachBatch(field, corners, [&](const BrickBatch& batch) {

@@ -1,12 +1,15 @@
 #pragma once
-/// The Gaussian window of SSIM (Wang et al. 2004) and its sums over the voxels around a brick.
+/// The Gaussian window of SSIM (Wang et al. 2004) and its sums over the voxels around a brick: the halo of
+/// a brick, the inner loops, the sums, and the bricks whose windows reach a set of bricks.
 
 #include <array>
 #include <cstdint>
+#include <span>
+#include <vector>
 
+#include "core/brick_index.h"
 #include "esvr/coord.h"
 #include "esvr/sparse_volume.h"
-#include "field/ssim_kernels.h"
 
 namespace esvr {
 
@@ -37,6 +40,42 @@ constexpr int haloOffset(int x, int y, int z) { return (x * kHaloSide + y) * kHa
 [[nodiscard]] Box windowsThatSee(const Box& halo);
 /// The halo coordinates that the windows around a box of the brick's voxels overlap.
 [[nodiscard]] Box seenByWindows(const Box& voxels);
+
+/// The numbers in an index of a brick and its 26 neighbours, z fastest, with the brick itself in
+/// the middle; BrickIndex::kNone for missing bricks.
+using BricksAround = std::array<std::uint32_t, 27>;
+[[nodiscard]] BricksAround bricksAround(const BrickIndex& index, Coord brick);
+
+/// The smallest box of halo coordinates outside which all values are zero.
+/// \param boxes  for each brick of the index, a box of local coordinates outside which it is zero
+[[nodiscard]] Box haloSupport(const BricksAround& around, std::span<const Box> boxes);
+
+/// The values of the 27 bricks, kBrickVoxels each; null for bricks that are zero.
+template <class Value>
+using ValuesAround = std::array<const Value*, 27>;
+
+/// Fills a halo with the values as float64, so that window sums of their products are precise.
+/// \param seen  halo coordinates to fill, which is extended to whole rows along z
+void fillHalo(const ValuesAround<float>& bricks, const Box& seen, HaloValues& out);
+void fillHalo(const ValuesAround<double>& bricks, const Box& seen, HaloValues& out);
+
+/// The inner loops over SSIM windows. They are compiled once for each instruction set and chosen at
+/// run time (brick_kernels.inl and brick_kernels.cpp).
+struct SsimKernels {
+  const char* name;
+  /// Computes out[i] = sum over t of weights[t] * in[i + t * stride] for i from 0 to count - 1,
+  /// with the kSsimTaps weights of a symmetric window. `in` and `out` must not overlap.
+  void (*sumTaps)(const double* weights, const double* in, int stride, double* out, int count);
+  /// Does the same along rows of kHaloSide values, whose results are rows of kBrickSide values.
+  void (*sumRows)(const double* weights, const double* in, double* out, int rows);
+  void (*multiply)(const double* a, const double* b, double* product, int count);
+};
+
+/// The kernels for the best instruction set of this processor.
+[[nodiscard]] const SsimKernels& ssimKernels();
+
+/// The kernels for all instruction sets that this processor has, the best first.
+[[nodiscard]] std::vector<const SsimKernels*> runnableSsimKernels();
 
 /// Computes the weighted sums of the windows around a brick's voxels, axis by axis.
 class SsimWindow {
@@ -72,5 +111,10 @@ class SsimWindow {
   std::array<double, kBrickSide * kHaloSide * kHaloSide> sumsX_{};
   std::array<double, kBrickSide * kBrickSide * kHaloSide> sumsXy_{};
 };
+
+/// Grows a set of bricks by one in every direction, as far as windows reach.
+/// \param bricks  in strictly increasing order
+/// \return the bricks and their 26 neighbours each, in strictly increasing order
+[[nodiscard]] std::vector<Coord> dilateBricks(std::span<const Coord> bricks);
 
 }  // namespace esvr

@@ -1,15 +1,207 @@
+/// How precisely fields are evaluated: the definition in float64, the bound of the rounding in float32, the
+/// ellipsoids that are most difficult to evaluate, and the comparison of both on bricks of a field.
+
 #include "esvr/stability.h"
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/parallel.h"
 #include "esvr/field.h"
-#include "field/extreme_ellipsoids.h"
+#include "field/evaluate.h"
 #include "field/reference_brick.h"
 
 namespace esvr {
+namespace {
+
+/// |L d|^2
+double squaredLength(const Matrix3& L, const double (&d)[3]) {
+  double m = 0.0;
+  for (int r = 0; r < 3; ++r) {
+    const double u = L[3 * r] * d[0] + L[3 * r + 1] * d[1] + L[3 * r + 2] * d[2];
+    m += u * u;
+  }
+  return m;
+}
+
+}  // namespace
+
+double evaluateReference(const Field& field, Coord voxel) {
+  double value = field.background;
+  for (const Chunk& chunk : field.chunks) {
+    const Ellipsoids& e = chunk.ellipsoids;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      const double d[3] = {double(voxel.x) - chunk.origin.x - e.center[0][i],
+                           double(voxel.y) - chunk.origin.y - e.center[1][i],
+                           double(voxel.z) - chunk.origin.z - e.center[2][i]};
+      const auto k = kernelConstants<double>(field.kernel, kappaOf(field, e, i));
+      value += double(e.intensity[i]) * kernelPhi(k, squaredLength(unitFrame(e, i), d));
+    }
+  }
+  return value;
+}
+
+// The sums of bricks and their bounds.
+
+namespace {
+
+/// A number of voxels along an axis, rounded away from the middle of an interval and limited to the
+/// index space.
+std::int32_t placeAlong(double at) {
+  return std::int32_t(std::clamp(at, double(Box::kMin), double(Box::kMax)));
+}
+
+/// The voxels of the bounding box of a support.
+Box boxOf(const Support& s) {
+  const auto low = [&](std::size_t a) { return placeAlong(std::floor(s.center[a] - s.half[a])); };
+  const auto high = [&](std::size_t a) { return placeAlong(std::ceil(s.center[a] + s.half[a])); };
+  return {{low(0), low(1), low(2)}, {high(0), high(1), high(2)}};
+}
+
+/// An ellipsoid in float64.
+struct ReferenceEllipsoid {
+  ReferenceEllipsoid(const Field& field, const Chunk& chunk, std::size_t i)
+      : origin(chunk.origin),
+        center{chunk.ellipsoids.center[0][i], chunk.ellipsoids.center[1][i],
+               chunk.ellipsoids.center[2][i]},
+        L(unitFrame(chunk.ellipsoids, i)),
+        columns(rounding::columnLengths(L)),
+        kernel(kernelConstants<double>(field.kernel, kappaOf(field, chunk.ellipsoids, i))),
+        intensity(chunk.ellipsoids.intensity[i]) {}
+
+  void addTo(VoxelTerms& terms, Coord voxel) const {
+    const double d[3] = {double(voxel.x) - origin.x - center[0],
+                         double(voxel.y) - origin.y - center[1],
+                         double(voxel.z) - origin.z - center[2]};
+    const double m = squaredLength(L, d);
+    const double term = intensity * kernelPhi(kernel, m);
+    terms.sum += term;
+    terms.magnitudes += std::abs(term);
+    terms.errors += std::abs(intensity) * rounding::ofPhi(kernel, m, rounding::ofM(columns, d, m));
+    terms.count += m < kernel.cutoff ? 1u : 0u;
+  }
+
+  Coord origin;
+  std::array<double, 3> center;
+  Matrix3 L;
+  rounding::ColumnLengths columns;
+  KernelConstants<double> kernel;
+  double intensity;
+};
+
+}  // namespace
+
+ReferenceField::ReferenceField(const Field& field) : field_(field) {
+  for (const Support& support : supports(field)) boxes_.push_back(boxOf(support));
+}
+
+ReferenceBrick ReferenceField::evaluate(Coord corner) const {
+  constexpr std::int32_t kLast = kBrickSide - 1;
+  const Box voxels{corner, corner + Coord{kLast, kLast, kLast}};
+  ReferenceBrick brick{};
+  std::size_t number = 0;
+  for (const Chunk& chunk : field_.chunks)
+    for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i) {
+      if (common(boxes_[number++], voxels).empty()) continue;
+      const ReferenceEllipsoid ellipsoid(field_, chunk, i);
+      ++brick.ellipsoids;
+      brick.largestIntensity = std::max(brick.largestIntensity, std::abs(ellipsoid.intensity));
+      for (int v = 0; v < kBrickVoxels; ++v)
+        ellipsoid.addTo(brick.voxels[std::size_t(v)], corner + voxelLocal(v));
+    }
+  return brick;
+}
+
+double ReferenceField::bound(const ReferenceBrick& brick, int voxel,
+                             const Arithmetic& arithmetic) const {
+  constexpr double kSmallestOfCpu = 0x1p-149, kSmallestNormal = 0x1p-126, kUnitOfSum = 0x1p-29;
+  const VoxelTerms& terms = brick.voxels[std::size_t(voxel)];
+  const double count = double(brick.ellipsoids);
+  const double ofSum = rounding::kUnit * ((terms.count + rounding::kOfTerm) * terms.magnitudes +
+                                          std::abs(double(field_.background)));
+  const double smallest = arithmetic.integerSums ? kSmallestNormal : kSmallestOfCpu;
+  const double ofUnits =
+      arithmetic.integerSums ? terms.count * count * brick.largestIntensity * kUnitOfSum : 0.0;
+  return terms.errors + ofSum + ofUnits + count * smallest;
+}
+
+// The ellipsoids that are most difficult to evaluate.
+
+namespace {
+
+/// The figures of one ellipsoid.
+struct EllipsoidFigures {
+  double smallest, largest, aspect, intensity, kappa;
+};
+
+EllipsoidFigures figuresOf(const Field& field, const Ellipsoids& e, std::size_t i) {
+  const auto [low, high] = std::minmax({e.logScale[0][i], e.logScale[1][i], e.logScale[2][i]});
+  return {std::exp(double(low)), std::exp(double(high)), std::exp(double(high) - double(low)),
+          std::abs(double(e.intensity[i])), kappaOf(field, e, i)};
+}
+
+/// Calls visit(figures, chunk, index in the chunk) for every ellipsoid.
+template <class Visit>
+void forEachFigures(const Field& field, Visit&& visit) {
+  for (const Chunk& chunk : field.chunks)
+    for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i)
+      visit(figuresOf(field, chunk.ellipsoids, i), chunk, i);
+}
+
+/// The place of an ellipsoid, and the figure by which it was chosen.
+struct Extreme {
+  double figure = 0.0;
+  const Chunk* chunk = nullptr;
+  std::size_t index = 0;
+
+  void replaceIfBelow(double other, const Chunk& by, std::size_t i) {
+    if (chunk == nullptr || other > figure) *this = {other, &by, i};
+  }
+  [[nodiscard]] Coord center() const {
+    const auto along = [&](std::size_t a, std::int32_t origin) {
+      const double at = std::round(double(origin) + double(chunk->ellipsoids.center[a][index]));
+      return std::int32_t(std::clamp(at, double(Box::kMin), double(Box::kMax)));
+    };
+    return {along(0, chunk->origin.x), along(1, chunk->origin.y), along(2, chunk->origin.z)};
+  }
+};
+
+}  // namespace
+
+FieldExtremes extremesOf(const Field& field) {
+  FieldExtremes all;
+  bool first = true;
+  forEachFigures(field, [&](const EllipsoidFigures& f, const Chunk&, std::size_t) {
+    const auto lower = [&](double& value, double by) { value = first ? by : std::min(value, by); };
+    const auto raise = [&](double& value, double by) { value = first ? by : std::max(value, by); };
+    lower(all.smallestScale, f.smallest), raise(all.largestScale, f.largest);
+    raise(all.largestAspect, f.aspect);
+    lower(all.lowestKappa, f.kappa), raise(all.highestKappa, f.kappa);
+    lower(all.smallestIntensity, f.intensity), raise(all.largestIntensity, f.intensity);
+    first = false;
+  });
+  all.largestCondition = all.largestAspect * all.largestAspect;
+  return all;
+}
+
+std::vector<Coord> centersOfExtremes(const Field& field) {
+  Extreme smallest, largest, aspect, intensity;
+  forEachFigures(field, [&](const EllipsoidFigures& f, const Chunk& chunk, std::size_t i) {
+    smallest.replaceIfBelow(-f.smallest, chunk, i);
+    largest.replaceIfBelow(f.largest, chunk, i);
+    aspect.replaceIfBelow(f.aspect, chunk, i);
+    intensity.replaceIfBelow(f.intensity, chunk, i);
+  });
+  std::vector<Coord> centers;
+  for (const Extreme& c : {smallest, largest, aspect, intensity})
+    if (c.chunk != nullptr) centers.push_back(c.center());
+  return centers;
+}
+
+// The comparison.
+
 namespace {
 
 /// Sums over voxels from which the figures of a field follow.

@@ -1,13 +1,18 @@
 #pragma once
-/// The rule that turns a sum of ellipsoids into a voxel, which revoxelise() applies. Its parameters
-/// are explained in RevoxeliseOptions (field.h). The code is compiled for host and device.
+/// How sums of ellipsoids become voxels: the rule that revoxelise() applies to a value, and where voxels
+/// of a brick may be active. The parameters are explained in RevoxeliseOptions (field.h). The rule and
+/// LocalBox are compiled for host and device.
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
 
 #include "esvr/block_levels.h"
+#include "esvr/coord.h"
 #include "esvr/field.h"
 #include "esvr/kernel.h"
+#include "esvr/sparse_volume.h"
 
 namespace esvr {
 
@@ -50,5 +55,55 @@ struct VoxelRule {
   rule.narrowBand = options.narrowBand;
   return rule;
 }
+
+/// The part of a box within the voxels 0 to `last` of a brick along each axis, counted from the
+/// brick's first voxel. If it is empty, high is below low along an axis.
+struct LocalBox {
+  int low[3], high[3];
+
+  [[nodiscard]] ESVR_HD bool contains(int x, int y, int z) const {
+    return x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1] && z >= low[2] &&
+           z <= high[2];
+  }
+};
+
+/// \param corner  index coordinates of the brick's first voxel
+/// \param last    the last voxel along each axis, for example kBrickSide - 1
+ESVR_HD inline LocalBox localBox(const Box& box, const Coord& corner, int last) {
+  const auto within = [last](std::int64_t place, int below, int above) {
+    return place < below ? below : (place > last + above ? last + above : int(place));
+  };
+  const auto from = [&](std::int32_t at, std::int32_t first) {
+    return within(std::int64_t(at) - first, 0, 1);
+  };
+  const auto to = [&](std::int32_t at, std::int32_t first) {
+    return within(std::int64_t(at) - first, -1, 0);
+  };
+  return {{from(box.min.x, corner.x), from(box.min.y, corner.y), from(box.min.z, corner.z)},
+          {to(box.max.x, corner.x), to(box.max.y, corner.y), to(box.max.z, corner.z)}};
+}
+
+/// How the voxels of one brick become active.
+struct BrickRegion {
+  BrickMask within;     ///< no other voxel is active
+  bool byValue = true;  ///< true: the rule of values decides about these; false: all are active
+  const BlockLevels* levels = nullptr;  ///< levels of the brick's blocks; null: one threshold
+
+  /// \param v  voxelOffset of a voxel, of which `settled` is the value by the rule
+  [[nodiscard]] bool isActive(const VoxelRule& rule, int v, float settled) const {
+    if (!within.test(v)) return false;
+    if (!byValue) return true;
+    return levels ? rule.isActive(settled, levels->at(v)) : rule.isActive(settled);
+  }
+};
+
+/// The voxels of a brick that lie in a box. \param corner  its first voxel
+[[nodiscard]] BrickMask maskOf(const Box& box, Coord corner);
+
+/// \param corner  index coordinates of the brick's first voxel
+[[nodiscard]] BrickRegion regionIn(const RevoxeliseOptions& options, Coord corner);
+
+/// Turns the sums of one brick into voxels. \return the mask of its active voxels
+BrickMask settle(const VoxelRule& rule, const BrickRegion& region, std::span<float> values);
 
 }  // namespace esvr

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 
-#include "field/brick_batches.h"
-#include "field/brick_walk.h"
-#include "field/count_bricks.h"
-#include "field/gather.h"
+#include "field/brick_pairs.h"
+#include "field/evaluate.h"
 
 namespace esvr {
 namespace {

@@ -22,7 +22,6 @@
 #include "metrics/brick_pairs.h"
 
 namespace esvr {
-
 namespace {
 
 using metrics::Backgrounds;

@@ -313,7 +313,6 @@ double featureDifference(const SeenPicture& a, const SeenPicture& b, std::size_t
 }
 
 }  // namespace
-
 }  // namespace esvr::metrics
 
 namespace esvr {

@@ -14,7 +14,6 @@
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "field/dilate_bricks.h"
 #include "field/ssim_window.h"
 #include "metrics/brick_pairs.h"
 

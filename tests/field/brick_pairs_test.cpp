@@ -1,21 +1,116 @@
 // Plan: the pairs over the bricks of an index are those found by testing every brick against every
 // support, in the order of the bricks' coordinates, for supports that are smaller and larger than
 // the index. More pairs than 32 bits can number are refused.
+// forEachReachedBrick visits the bricks that a test of every brick of the bounding box finds,
+// in the same order, for balls, thin and flat ellipsoids of all directions. Supports with NaN have
+// no bricks, supports beyond the index space are cut off, and upper bounds of counts hold.
+
 #include "field/brick_pairs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
 
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "field/gather.h"
-#include "field/offsets.h"
+#include "field/evaluate.h"
 #include "field/random_field.h"
+#include "field/support.h"
 
 namespace esvr {
 namespace {
+
+constexpr Box kAll = bricksOf(Box::whole());
+
+std::vector<Coord> walked(const Support& support, const Box& within = kAll) {
+  std::vector<Coord> bricks;
+  forEachReachedBrick(support, within, [&](Coord brick) { bricks.push_back(brick); });
+  return bricks;
+}
+
+std::vector<Coord> lookedUp(const Support& support, const Box& within = kAll) {
+  std::vector<Coord> bricks;
+  brick_walk::visitBox(SlabTest(support), common(brickRange(support), within),
+                       [&](Coord brick) { bricks.push_back(brick); });
+  return bricks;
+}
+
+Field fieldOf(double smallest, double aspect) {
+  return test::randomField({.count = 30, .extent = 100.0, .smallest = smallest, .aspect = aspect});
+}
+
+TEST(BrickWalk, FindsTheBricksOfTheWholeBox) {
+  for (const auto& [smallest, aspect] :
+       {std::pair{0.2, 1.0}, {20.0, 1.0}, {40.0, 3.0}, {0.3, 300.0}, {0.01, 1e4}})
+    for (const Support& support : supports(fieldOf(smallest, aspect)))
+      EXPECT_EQ(walked(support), lookedUp(support)) << smallest << " " << aspect;
+}
+
+TEST(BrickWalk, FindsTheBricksOfAPart) {
+  const Box part{{-3, 2, -20}, {9, 11, 30}};
+  for (const Support& support : supports(fieldOf(5.0, 20.0)))
+    EXPECT_EQ(walked(support, part), lookedUp(support, part));
+}
+
+TEST(BrickWalk, CountsAreBounded) {
+  for (const auto& [smallest, aspect] : {std::pair{0.2, 1.0}, {20.0, 1.0}, {0.3, 300.0}}) {
+    const auto reach = supports(fieldOf(smallest, aspect));
+    for (const Support& support : reach)
+      EXPECT_GE(maxBricks(support, kAll), double(walked(support).size()));
+  }
+}
+
+TEST(BrickWalk, ABoundOnTheBricksOfALargeSupportIsClose) {
+  for (const Support& support : supports(fieldOf(50.0, 1.5)))
+    EXPECT_LE(maxBricks(support, kAll), 1.5 * double(walked(support).size()));
+}
+
+TEST(BrickWalk, CountsBricksThatSeveralSupportsReachOnce) {
+  const Field field = fieldOf(10.0, 2.0);
+  const auto reach = supports(field);
+  const double counted = countBricks(reach, kAll, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(counted, double(reachedBricks(field).size()));
+  const double stopped = countBricks(reach, kAll, counted / 2.0);
+  EXPECT_GT(stopped, counted / 2.0);
+  EXPECT_LE(stopped, counted);
+}
+
+Support ballOf(double center, double logScale) {
+  const double inverse = std::exp(-logScale);
+  return makeSupport({center, center, center}, {inverse, 0, 0, 0, inverse, 0, 0, 0, inverse}, 2.0,
+                     0.02);
+}
+
+TEST(BrickWalk, ASupportBeyondTheIndexSpaceIsCutOffAtItsEnds) {
+  for (const double logScale : {25.0, 32.0, 60.0})
+    EXPECT_EQ(brickRange(ballOf(1000.0, logScale)), kAll) << logScale;
+  const Box far = brickRange(ballOf(1e30, 3.0));
+  EXPECT_EQ(far.min, kAll.max);
+  EXPECT_TRUE(walked(ballOf(1e30, 3.0)).empty());
+}
+
+TEST(BrickWalk, ASupportWithoutNumbersHasNoBricks) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Support& support : {ballOf(nan, 1.0), ballOf(0.0, nan), ballOf(0.0, 1000.0)})
+    EXPECT_TRUE(brickRange(support).empty());
+}
+
+// The bounding box of a diagonal thin ellipsoid has 10^12 bricks, of which it reaches about 10^5.
+TEST(BrickWalk, ANeedleCostsWhatItReaches) {
+  const double s = 1.0 / std::sqrt(3.0), t = 1.0 / std::sqrt(2.0), u = 1.0 / std::sqrt(6.0);
+  const double across = 1.0, along = 1.0 / 35000.0;
+  const Matrix3 L{along * s, along * s,  along * s,  across * t,       -across * t,
+                  0.0,       across * u, across * u, -2.0 * across * u};
+  const auto bricks = walked(makeSupport({0.0, 0.0, 0.0}, L, 2.0, 0.02));
+  EXPECT_GT(bricks.size(), 10000u);
+  EXPECT_LT(bricks.size(), 1000000u);
+}
+
+// Pairs.
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;

@@ -14,8 +14,6 @@
 #include <memory>
 #include <numeric>
 
-#include "field/brick_halo.h"
-#include "field/dilate_bricks.h"
 #include "field/random_field.h"
 
 namespace esvr {

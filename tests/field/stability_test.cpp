@@ -1,19 +1,28 @@
 // Plan: fields of all shapes, kernels and sizes are evaluated in float32 and measured. The difference
 // must stay below the bound of the arithmetic, and the bound within a factor of what it bounds, so
 // that it says something. A wrong evaluation, or one that is not finite, is found and named. The
-// figures of small fields are known by hand: overlap, cancellation and correct digits.
+// figures of small fields are known by hand: overlap, cancellation, correct digits, extremes and their
+// centers.
+// The float64 sum of a brick, which leaves out ellipsoids that are far away, is compared with the
+// definition. The counts of terms and the bound are those of a field that is known by hand.
+// The slope of the kernel is compared with differences in float64, and the largest slope of an
+// interval with many slopes in it. If m is moved by any amount up to the bound of its error, phi must
+// not change by more than its bound; this holds at the edge, at the end of the support, and for the
+// paper's kernel, which jumps there. The bound of m is compared with float32 arithmetic.
 
 #include "esvr/stability.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
 #include <tbb/global_control.h>
+
 #include <cmath>
 #include <limits>
 
 #include "esvr/field.h"
+#include "field/line_form.h"
 #include "field/random_field.h"
+#include "field/reference_brick.h"
 
 namespace esvr {
 namespace {
@@ -174,6 +183,175 @@ TEST(CorrectDigits, AreThoseBelowThePeak) {
   EXPECT_EQ(correctDigits(2.0, 1.0), 0);
   EXPECT_EQ(correctDigits(1e-30, 0.0), 0);
   EXPECT_EQ(correctDigits(std::numeric_limits<double>::quiet_NaN(), 1.0), 0);
+}
+
+// The ellipsoids that are most difficult to evaluate.
+
+TEST(ExtremeEllipsoids, AreThoseOfTheEllipsoids) {
+  Field field = test::randomField({.count = 3, .kappa = 4.0f});
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  e.logScale = {std::vector{0.0f, std::log(0.1f), 1.0f},
+                {0.0f, std::log(100.0f), 1.0f},
+                {std::log(300.0f), 0.0f, 1.0f}};
+  e.intensity = {1.0f, -3.0f, 0.5f};
+  const FieldExtremes all = extremesOf(field);
+  EXPECT_NEAR(all.smallestScale, 0.1, 1e-7);
+  EXPECT_NEAR(all.largestScale, 300.0, 1e-3);
+  EXPECT_NEAR(all.largestAspect, 1000.0, 1e-2);
+  EXPECT_NEAR(all.largestCondition, 1e6, 20.0);
+  EXPECT_EQ(all.lowestKappa, 4.0);
+  EXPECT_EQ(all.highestKappa, 4.0);
+  EXPECT_EQ(all.smallestIntensity, 0.5);
+  EXPECT_EQ(all.largestIntensity, 3.0);
+  e.kappa = {-1.0f, 2.0f, 7.0f};
+  EXPECT_EQ(extremesOf(field).lowestKappa, -1.0);
+  EXPECT_EQ(extremesOf(field).highestKappa, 7.0);
+}
+
+TEST(ExtremeEllipsoids, HaveCentersInIndexSpace) {
+  Field field = test::randomField({.count = 3, .extent = 1.0, .origin = {100, 0, -8}});
+  field.chunks.push_back(
+      test::randomField({.count = 1, .extent = 1.0, .intensity = 0.0, .origin = {5000, 8, 8}})
+          .chunks[0]);
+  for (Chunk& chunk : field.chunks)
+    for (auto& center : chunk.ellipsoids.center) std::ranges::fill(center, 2.6f);
+  Ellipsoids& first = field.chunks[0].ellipsoids;
+  for (auto& scale : field.chunks[1].ellipsoids.logScale) scale[0] = 3.0f;
+  for (auto& scale : first.logScale) std::ranges::fill(scale, 0.0f);
+  first.logScale[2] = {0.0f, -1.0f, 0.5f};  // the second one is the smallest, and the longest
+  const Coord inFirst{103, 3, -5}, inSecond{5003, 11, 11};
+  EXPECT_THAT(centersOfExtremes(field), testing::ElementsAre(inFirst, inSecond, inFirst, inFirst))
+      << "smallest scale, largest scale, aspect ratio, intensity";
+  EXPECT_TRUE(centersOfExtremes({}).empty());
+}
+
+// The reference.
+
+// Both sums are in float64 and have the same terms, in the same order.
+TEST(ReferenceBrick, IsTheDefinition) {
+  Field field = test::randomField({.count = 40, .aspect = 30.0});
+  field.background = 0.25f;
+  field.chunks.push_back(
+      test::randomField({.count = 10, .origin = {-5, 3, 9}, .seed = 3}).chunks[0]);
+  const ReferenceField reference(field);
+  for (const Coord corner : {Coord{0, 0, 0}, Coord{16, 24, 8}, Coord{-8, 0, 32}}) {
+    const ReferenceBrick brick = reference.evaluate(corner);
+    for (int v = 0; v < kBrickVoxels; v += 7)
+      EXPECT_NEAR(field.background + brick.voxels[std::size_t(v)].sum,
+                  evaluateReference(field, corner + voxelLocal(v)), 1e-14);
+  }
+}
+
+TEST(ReferenceBrick, ListsWhatReachesIt) {
+  Field field = test::randomField({.count = 1, .extent = 1.0, .smallest = 1.0, .aspect = 1.0});
+  field.chunks[0].ellipsoids.intensity[0] = -2.0f;
+  const ReferenceField reference(field);
+  const ReferenceBrick near = reference.evaluate({0, 0, 0}), far = reference.evaluate({80, 0, 0});
+  EXPECT_EQ(near.ellipsoids, 1u);
+  EXPECT_EQ(near.largestIntensity, 2.0);
+  EXPECT_EQ(near.voxels[0].count, 1u);
+  EXPECT_EQ(near.voxels[0].magnitudes, -near.voxels[0].sum);
+  EXPECT_EQ(near.voxels[std::size_t(voxelOffset({7, 7, 7}))].count, 0u);
+  EXPECT_EQ(far.ellipsoids, 0u);
+  EXPECT_EQ(far.voxels[0].sum, 0.0);
+}
+
+// A GPU rounds to units of the largest intensity too.
+TEST(ReferenceBrick, HasALargerBoundForIntegerSums) {
+  const Field field = test::randomField({.count = 40});
+  const ReferenceField reference(field);
+  const ReferenceBrick brick = reference.evaluate({16, 16, 16});
+  EXPECT_GT(reference.bound(brick, 0, {.integerSums = true}), reference.bound(brick, 0, {}));
+  EXPECT_GT(reference.bound(brick, 0, {}), 0.0);
+}
+
+// The bounds.
+
+struct KernelCase {
+  float kappa;
+  KernelForm form = KernelForm::kContinuous;
+};
+
+class RoundingBound : public testing::TestWithParam<KernelCase> {
+ protected:
+  const KernelConstants<double> kernel_ =
+      kernelConstants<double>({.form = GetParam().form, .kappa = GetParam().kappa});
+};
+
+TEST_P(RoundingBound, HasTheSlopeOfTheKernel) {
+  constexpr double kStep = 1e-6;
+  for (int n = 1; n < 100; ++n) {
+    const double m = n / 100.0 * kernel_.cutoff;
+    const double difference =
+        (kernelPhi(kernel_, m - kStep) - kernelPhi(kernel_, m + kStep)) / (2 * kStep);
+    // Differences of values up to 1 with errors of 2^-53, and of m with an error of 2^-53 kappa.
+    EXPECT_NEAR(rounding::slopeAt(kernel_, m), difference,
+                1e-8 + 1e-9 * std::abs(GetParam().kappa));
+  }
+}
+
+TEST_P(RoundingBound, HasTheSteepestSlopeOfAnInterval) {
+  test::Random random(3);
+  for (int n = 0; n < 100; ++n) {
+    const double from = random(0.0, kernel_.cutoff), to = random(from, kernel_.cutoff);
+    const double steepest = rounding::steepest(kernel_, from, to);
+    for (int i = 0; i <= 50; ++i)
+      EXPECT_LE(rounding::slopeAt(kernel_, from + i / 50.0 * (to - from)), steepest * (1 + 1e-12));
+  }
+}
+
+TEST_P(RoundingBound, CoversEveryErrorOfM) {
+  test::Random random(5);
+  for (const double error : {1e-6, 1e-3, 0.1, 2.0})
+    for (int n = 0; n < 200; ++n) {
+      const double m = random(0.0, 1.1 * kernel_.cutoff + error);
+      const double bound = rounding::ofPhi(kernel_, m, error);
+      for (const double off : {-error, random(-error, error), error}) {
+        const double moved = kernelPhi(kernel_, std::max(0.0, m + off));
+        EXPECT_LE(std::abs(moved - kernelPhi(kernel_, m)), bound) << m << " by " << off;
+      }
+    }
+}
+
+TEST_P(RoundingBound, IsNothingOutsideTheSupport) {
+  EXPECT_EQ(rounding::ofPhi(kernel_, 1.01 * kernel_.cutoff + 1.0, 1e-6), 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kernels, RoundingBound,
+                         testing::Values(KernelCase{-30.0f}, KernelCase{0.0f}, KernelCase{2.0f},
+                                         KernelCase{30.0f}, KernelCase{5000.0f},
+                                         KernelCase{5.0f, KernelForm::kPaper},
+                                         KernelCase{0.5f, KernelForm::kPaper}));
+
+/// m of an ellipsoid at a voxel, in the float32 arithmetic of a line.
+float squaredInFloat(const LineForm& f, Coord voxel) {
+  const float dx = float(voxel.x) - f.center[0], dz = float(voxel.z) - f.center[2];
+  const float pzDz[3] = {f.pz[0] * dz, f.pz[1] * dz, f.pz[2] * dz};
+  const float t = distanceAlong(f, float(voxel.y), f.center[1], dx, dz);
+  return squaredAt(f, closestSquared(f, dx, pzDz), t);
+}
+
+TEST(RoundingBoundOfM, CoversFloat32) {
+  const Field field =
+      test::randomField({.count = 200, .extent = 8.0, .smallest = 0.1, .aspect = 1000.0});
+  const Ellipsoids& e = field.chunks[0].ellipsoids;
+  double largestShare = 0.0;
+  for (std::size_t i = 0; i < e.size(); ++i) {
+    const Matrix3 L = unitFrame(e, i);
+    const std::array<double, 3> center{e.center[0][i], e.center[1][i], e.center[2][i]};
+    const LineForm form = makeLineForm(center, L, 1.0, 1.0);
+    for (const Coord voxel : {Coord{0, 0, 0}, Coord{7, 1, 3}, Coord{2, 6, 5}}) {
+      const double d[3] = {voxel.x - center[0], voxel.y - center[1], voxel.z - center[2]};
+      double m = 0.0;
+      for (int r = 0; r < 3; ++r)
+        m += std::pow(L[3 * r] * d[0] + L[3 * r + 1] * d[1] + L[3 * r + 2] * d[2], 2);
+      const double bound = rounding::ofM(rounding::columnLengths(L), d, m);
+      const double error = std::abs(double(squaredInFloat(form, voxel)) - m);
+      EXPECT_LE(error, bound);
+      largestShare = std::max(largestShare, error / bound);
+    }
+  }
+  EXPECT_GT(largestShare, 1e-3) << "a bound that is much too large says nothing";
 }
 
 }  // namespace

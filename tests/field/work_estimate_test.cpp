@@ -9,7 +9,7 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/memory_limit.h"
-#include "field/evaluate_plan.h"
+#include "field/evaluate.h"
 #include "field/random_field.h"
 
 namespace esvr {

@@ -32,7 +32,6 @@
 #include "support/on_threads.h"
 
 namespace esvr {
-
 namespace {
 
 using test::movedBy;
@@ -524,5 +523,4 @@ TEST(CompareSigns, KnowsTheSideOfEmptySpace) {
 }
 
 }  // namespace
-
 }  // namespace esvr

@@ -3,7 +3,7 @@
 // closest point must be a lower bound for the line in float32 too, because the CUDA kernel skips
 // lines by it.
 
-#include "field/line_math.h"
+#include "field/line_form.h"
 
 #include <gtest/gtest.h>
 

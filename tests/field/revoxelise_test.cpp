@@ -1,17 +1,55 @@
-// Plan: the voxels of a box in a brick are compared with a test of every voxel, for boxes that cut
-// through it, miss it, contain it, are empty, or end at the limits of 32-bit integers. The region of
-// a brick is compared with its definition for all combinations of box, bricks and masks.
-
-#include "field/active_region.h"
+// Plan: the rule follows its definition in RevoxeliseOptions for all backgrounds, ranges,
+// thresholds and bands, and revoxelise() applies it. The voxels of a box in a brick are compared with a
+// test of every voxel, for boxes that cut through it, miss it, contain it, are empty, or end at the
+// limits of 32-bit integers. The region of a brick is compared with its definition for all combinations
+// of box, bricks and masks.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
-#include "field/local_box.h"
+#include "field/voxel_rule.h"
 
 namespace esvr {
 namespace {
+
+// The rule.
+
+float byDefinition(float background, const RevoxeliseOptions& o, float sum) {
+  const float value = o.range ? std::clamp(sum, o.range->min, o.range->max) : sum;
+  if (o.narrowBand) {
+    if (std::abs(value) < background - o.threshold) return value;
+    return value < 0.0f ? -background : background;
+  }
+  return std::abs(value - background) > o.threshold ? value : background;
+}
+
+void expectTheRule(float background, const RevoxeliseOptions& options) {
+  const VoxelRule rule = makeVoxelRule(background, options);
+  for (float v = -2.0f; v <= 2.0f; v += 0.0625f)
+    EXPECT_EQ(rule(v), byDefinition(background, options, v))
+        << background << " " << options.threshold << " " << v;
+}
+
+TEST(VoxelRule, IsThatOfRevoxeliseOptions) {
+  const std::optional<ValueRange> ranges[] = {std::nullopt, ValueRange{-0.5f, 0.75f}};
+  for (const float threshold : {-1.0f, 0.0f, 0.125f})
+    for (const auto& range : ranges) {
+      for (const float background : {0.0f, 0.25f, -1.0f})
+        expectTheRule(background, {.threshold = threshold, .range = range});
+      expectTheRule(0.5f, {.threshold = threshold, .range = range, .narrowBand = true});
+    }
+}
+
+TEST(VoxelRule, KeepsTheSignOfWhatIsNotInTheBand) {
+  const VoxelRule rule = makeVoxelRule(3.0f, {.narrowBand = true});
+  EXPECT_EQ(rule(-4.0f), -3.0f);
+  EXPECT_EQ(rule(4.0f), 3.0f);
+  EXPECT_EQ(rule(-2.0f), -2.0f);
+}
+
+// Regions.
 
 BrickMask maskByVoxels(const Box& box, Coord corner) {
   BrickMask mask;

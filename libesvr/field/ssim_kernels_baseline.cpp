@@ -1,3 +1,0 @@
-#define ESVR_KERNEL_NAMESPACE baseline
-#define ESVR_KERNEL_NAME "baseline"
-#include "field/ssim_kernels.inl"
