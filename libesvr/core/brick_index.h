@@ -1,16 +1,27 @@
 #pragma once
-/// A hash table that finds bricks by their coordinates. Its size depends on the number of bricks
-/// only.
+/// A hash table that finds bricks by their coordinates, and its hash, which tables on the device use as
+/// well. The size of the table depends on the number of bricks only.
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "core/brick_hash.h"
 #include "esvr/coord.h"
+#include "esvr/kernel.h"
 
 namespace esvr {
+
+/// The hash of a brick's coordinates.
+ESVR_HD inline std::uint64_t hashOf(Coord c) {
+  std::uint64_t h = std::uint32_t(c.x) * 0x9e3779b97f4a7c15ull;
+  h = (h ^ (h >> 29)) + std::uint32_t(c.y) * 0xbf58476d1ce4e5b9ull;
+  h = (h ^ (h >> 32)) + std::uint32_t(c.z) * 0x94d049bb133111ebull;
+  return h ^ (h >> 31);
+}
+
+/// The same as operator==, which nvcc 13 cannot call on the device if it is defaulted.
+ESVR_HD inline bool sameBrick(Coord a, Coord b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 class BrickIndex {
  public:
@@ -23,7 +34,7 @@ class BrickIndex {
   [[nodiscard]] std::uint32_t find(Coord brick) const {
     for (std::size_t slot = hash(brick) & mask_;; slot = (slot + 1) & mask_) {
       if (slots_[slot] == kNone) return kNone;
-      if (bricks_[slots_[slot]] == brick) return slots_[slot];
+      if (sameBrick(bricks_[slots_[slot]], brick)) return slots_[slot];
     }
   }
   /// Appends those of the bricks that are not in the table.

@@ -1,5 +1,5 @@
 #pragma once
-/// A limit on the memory that a reader takes for the content of a file.
+/// Limits on memory: sizes for people, and a limit on what a reader takes for the content of a file.
 
 #include <cstdint>
 #include <string>
@@ -10,6 +10,10 @@
 
 namespace esvr {
 
+/// A size for people, for example "512 MB" or "1.5 GB".
+[[nodiscard]] std::string byteText(double bytes);
+
+/// A limit on the memory that a reader takes for the content of a file.
 class MemoryBudget {
  public:
   /// \param voxels  holds voxels

@@ -2,10 +2,22 @@
 
 #include <unistd.h>
 
-#include "core/byte_text.h"
+#include <cstdio>
+
+#include "core/memory_budget.h"
 #include "esvr/error.h"
 
 namespace esvr {
+
+std::string byteText(double bytes) {
+  constexpr double kMega = 1e6, kGiga = 1e9;
+  char text[32];
+  if (bytes < kGiga)
+    std::snprintf(text, sizeof text, "%.3g MB", bytes / kMega);
+  else
+    std::snprintf(text, sizeof text, "%.3g GB", bytes / kGiga);
+  return text;
+}
 
 std::uint64_t usualMemoryLimit() {
   const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGESIZE);

@@ -1,4 +1,6 @@
-#include "core/cuda_probe.h"
+/// What a build without CUDA says about devices.
+
+#include "core/device_choice.h"
 #include "esvr/device.h"
 
 namespace esvr {

@@ -1,25 +1,34 @@
+/// Volumes of bricks: how they are made, searched and measured; grids of vectors, which are three of them;
+/// and the index of their bricks.
+
 #include "esvr/sparse_volume.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <stdexcept>
 
+#include "core/brick_index.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
+#include "esvr/vector_grid.h"
 
 namespace esvr {
-namespace {
 
-constexpr std::int64_t kMaxExtent = std::int64_t{1} << 31;
+// Making volumes.
 
-Coord smallestCorner(const std::vector<BrickInput>& bricks) {
-  Coord origin = bricks.front().corner;
-  for (const auto& brick : bricks) origin = minCoord(origin, brick.corner);
-  return origin;
-}
+SparseVolume makeVolume(std::vector<BrickInput> bricks, float background) {
+  constexpr std::int64_t kMaxExtent = std::int64_t{1} << 31;
+  std::erase_if(bricks, [](const BrickInput& b) { return b.active.count() == 0; });
+  SparseVolume volume;
+  volume.background = background;
+  if (bricks.empty()) return volume;
 
-void refuseTooFarApart(Coord low, const std::vector<BrickInput>& bricks) {
+  std::sort(bricks.begin(), bricks.end(),
+            [](const BrickInput& a, const BrickInput& b) { return a.corner < b.corner; });
+  Coord low = bricks.front().corner;
+  for (const auto& brick : bricks) low = minCoord(low, brick.corner);
   for (const auto& brick : bricks) {
     const Coord c = brick.corner;
     const auto extent =
@@ -28,7 +37,85 @@ void refuseTooFarApart(Coord low, const std::vector<BrickInput>& bricks) {
       throw BadInput("the active voxels at " + toString(low) + " and " + toString(c) +
                      " are 2^31 voxels or more apart");
   }
+  volume.origin = low;
+
+  volume.bricks.reserve(bricks.size());
+  volume.active.reserve(bricks.size());
+  volume.values.reserve(bricks.size() * kBrickVoxels);
+  for (const auto& brick : bricks) {
+    const Coord place = brickOf(brick.corner - volume.origin);
+    if (!volume.bricks.empty() && volume.bricks.back() == place)
+      throw BadInput("two bricks at " + toString(brick.corner));
+    volume.bricks.push_back(place);
+    volume.active.push_back(brick.active);
+    volume.values.insert(volume.values.end(), brick.values.begin(), brick.values.end());
+  }
+  return volume;
 }
+
+void dropInactiveBricks(SparseVolume& volume) {
+  std::size_t kept = 0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    if (kept != b) {
+      volume.bricks[kept] = volume.bricks[b];
+      volume.active[kept] = volume.active[b];
+      std::ranges::copy(volume.brickValues(b), volume.brickValues(kept).begin());
+    }
+    ++kept;
+  }
+  volume.bricks.resize(kept);
+  volume.active.resize(kept);
+  volume.values.resize(kept * kBrickVoxels);
+  // The origin moves to the smallest corner of the bricks, as in makeVolume.
+  Coord low = kept > 0 ? volume.bricks.front() : Coord{};
+  for (const Coord b : volume.bricks) low = minCoord(low, b);
+  for (Coord& b : volume.bricks) b = b - low;
+  volume.origin = kept > 0 ? volume.origin + low * kBrickSide : Coord{};
+}
+
+void setBackground(float background, SparseVolume& volume) {
+  volume.background = background;
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v)) values[std::size_t(v)] = background;
+  });
+}
+
+void checkInvariants(const SparseVolume& volume) {
+  const std::size_t n = volume.bricks.size();
+  if (volume.values.size() != n * kBrickVoxels || volume.active.size() != n)
+    throw std::logic_error("SparseVolume: arrays of different length");
+  const auto notIncreasing = [](Coord a, Coord b) { return !(a < b); };
+  if (std::adjacent_find(volume.bricks.begin(), volume.bricks.end(), notIncreasing) !=
+      volume.bricks.end())
+    throw std::logic_error("SparseVolume: bricks not in increasing order");
+  if (localOf(volume.origin) != Coord{})
+    throw std::logic_error("SparseVolume: origin is not a brick corner");
+}
+
+// Searching and measuring them.
+
+std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick) {
+  const auto it = std::lower_bound(volume.bricks.begin(), volume.bricks.end(), brick);
+  if (it == volume.bricks.end() || *it != brick) return std::nullopt;
+  return std::size_t(it - volume.bricks.begin());
+}
+
+float valueAt(const SparseVolume& volume, Coord voxel) {
+  // The difference is formed in bricks, because that of two voxels may exceed 32 bits.
+  const auto b = findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
+  return b ? volume.brickValues(*b)[voxelOffset(localOf(voxel))] : volume.background;
+}
+
+std::uint64_t activeVoxelCount(const SparseVolume& volume) {
+  std::uint64_t n = 0;
+  for (const auto& mask : volume.active) n += std::uint64_t(mask.count());
+  return n;
+}
+
+namespace {
 
 /// Adds the active voxels of a brick to a box.
 void addActive(const BrickMask& mask, Coord corner, Box& box) {
@@ -65,42 +152,7 @@ Result overBricks(const SparseVolume& volume, const Result& none, Add add) {
       });
 }
 
-/// Moves the origin to the smallest corner of the bricks, as in makeVolume.
-void tightenOrigin(SparseVolume& volume) {
-  if (volume.bricks.empty()) {
-    volume.origin = {};
-    return;
-  }
-  Coord low = volume.bricks.front();
-  for (const Coord b : volume.bricks) low = minCoord(low, b);
-  for (Coord& b : volume.bricks) b = b - low;
-  volume.origin = volume.origin + low * kBrickSide;
-}
-
-void addActive(std::span<const float> values, const BrickMask& active, ValueRange& range) {
-  for (int i = 0; i < kBrickVoxels; ++i)
-    if (active.test(i)) range.expand(values[i]);
-}
-
 }  // namespace
-
-std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick) {
-  const auto it = std::lower_bound(volume.bricks.begin(), volume.bricks.end(), brick);
-  if (it == volume.bricks.end() || *it != brick) return std::nullopt;
-  return std::size_t(it - volume.bricks.begin());
-}
-
-float valueAt(const SparseVolume& volume, Coord voxel) {
-  // The difference is formed in bricks, because that of two voxels may exceed 32 bits.
-  const auto b = findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
-  return b ? volume.brickValues(*b)[voxelOffset(localOf(voxel))] : volume.background;
-}
-
-std::uint64_t activeVoxelCount(const SparseVolume& volume) {
-  std::uint64_t n = 0;
-  for (const auto& mask : volume.active) n += std::uint64_t(mask.count());
-  return n;
-}
 
 Box activeBox(const SparseVolume& volume) {
   return overBricks(volume, Box{}, [&](std::size_t b, Box& box) {
@@ -109,9 +161,12 @@ Box activeBox(const SparseVolume& volume) {
 }
 
 ValueRange activeRange(const SparseVolume& volume) {
-  const ValueRange range = overBricks(
-      volume, ValueRange::none(),
-      [&](std::size_t b, ValueRange& r) { addActive(volume.brickValues(b), volume.active[b], r); });
+  const ValueRange range =
+      overBricks(volume, ValueRange::none(), [&](std::size_t b, ValueRange& result) {
+        const auto values = volume.brickValues(b);
+        for (int i = 0; i < kBrickVoxels; ++i)
+          if (volume.active[b].test(i)) result.expand(values[i]);
+      });
   if (range.min > range.max) throw BadInput("the grid has no active voxel");
   return range;
 }
@@ -136,67 +191,101 @@ double peakOf(const ValueRange& active, double background) {
   return low >= 0.0 ? high - std::max(span.low, 0.0) : std::min(span.high, 0.0) - low;
 }
 
-void setBackground(float background, SparseVolume& volume) {
-  volume.background = background;
-  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (!volume.active[b].test(v)) values[std::size_t(v)] = background;
+// Grids of vectors.
+
+namespace {
+
+/// The brick of a volume with this corner.
+std::optional<std::size_t> brickWith(const SparseVolume& volume, Coord corner) {
+  return findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+}
+
+/// A volume like another one, with bricks at these corners and without active voxels.
+SparseVolume withBricks(const SparseVolume& volume, const std::vector<Coord>& corners) {
+  SparseVolume result;
+  result.background = volume.background;
+  result.origin = corners.empty() ? Coord{} : corners.front();
+  for (const Coord corner : corners) result.origin = minCoord(result.origin, corner);
+  for (const Coord corner : corners) result.bricks.push_back(brickOf(corner - result.origin));
+  result.values =
+      VoxelArray<float>(corners.size() * kBrickVoxels, volume.background, memoryOf(volume));
+  result.active.resize(corners.size());
+  for (std::size_t b = 0; b < corners.size(); ++b)
+    if (const auto own = brickWith(volume, corners[b]))
+      std::ranges::copy(volume.brickValues(*own), result.brickValues(b).begin());
+  return result;
+}
+
+float lengthOf(double x, double y, double z) { return float(std::sqrt(x * x + y * y + z * z)); }
+
+}  // namespace
+
+std::string componentName(const std::string& grid, std::size_t component) {
+  constexpr std::array kAxisNames{'x', 'y', 'z'};
+  return grid + '.' + kAxisNames.at(component);
+}
+
+VectorVolume aligned(const VectorVolume& vectors) {
+  std::vector<Coord> corners;  // of all bricks of the components, increasing
+  for (const SparseVolume& volume : vectors)
+    for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
+  std::ranges::sort(corners);
+  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+  VectorVolume result;
+  for (std::size_t c = 0; c < kComponents; ++c) result[c] = withBricks(vectors[c], corners);
+  for (std::size_t b = 0; b < corners.size(); ++b) {
+    BrickMask any;
+    for (const SparseVolume& volume : vectors)
+      if (const auto own = brickWith(volume, corners[b]))
+        for (std::size_t w = 0; w < any.words.size(); ++w)
+          any.words[w] |= volume.active[*own].words[w];
+    for (SparseVolume& volume : result) volume.active[b] = any;
+  }
+  return result;
+}
+
+SparseVolume magnitudeOf(const VectorVolume& vectors) {
+  const VectorVolume all = aligned(vectors);
+  const SparseVolume &x = all[0], &y = all[1], &z = all[2];  // a lambda cannot capture bindings
+  SparseVolume result = x;
+  result.background = lengthOf(x.background, y.background, z.background);
+  parallelFor(std::size_t{0}, result.values.size(), [&](std::size_t v) {
+    result.values[v] = lengthOf(x.values[v], y.values[v], z.values[v]);
   });
+  return result;
 }
 
-void dropInactiveBricks(SparseVolume& volume) {
-  std::size_t kept = 0;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    if (volume.active[b].count() == 0) continue;
-    if (kept != b) {
-      volume.bricks[kept] = volume.bricks[b];
-      volume.active[kept] = volume.active[b];
-      std::ranges::copy(volume.brickValues(b), volume.brickValues(kept).begin());
-    }
-    ++kept;
-  }
-  volume.bricks.resize(kept);
-  volume.active.resize(kept);
-  volume.values.resize(kept * kBrickVoxels);
-  tightenOrigin(volume);
+// The index of bricks.
+
+BrickIndex::BrickIndex(std::span<const Coord> bricks) {
+  add(bricks);
+  rehash();
 }
 
-void checkInvariants(const SparseVolume& volume) {
-  const std::size_t n = volume.bricks.size();
-  if (volume.values.size() != n * kBrickVoxels || volume.active.size() != n)
-    throw std::logic_error("SparseVolume: arrays of different length");
-  const auto notIncreasing = [](Coord a, Coord b) { return !(a < b); };
-  if (std::adjacent_find(volume.bricks.begin(), volume.bricks.end(), notIncreasing) !=
-      volume.bricks.end())
-    throw std::logic_error("SparseVolume: bricks not in increasing order");
-  if (localOf(volume.origin) != Coord{})
-    throw std::logic_error("SparseVolume: origin is not a brick corner");
+void BrickIndex::add(std::span<const Coord> bricks) {
+  if (bricks_.size() + bricks.size() >= kNone)
+    throw RuntimeFailure("there are 2^32 bricks or more");
+  bricks_.insert(bricks_.end(), bricks.begin(), bricks.end());
+  for (const Coord brick : bricks) bounds_.expand(brick);
 }
 
-SparseVolume makeVolume(std::vector<BrickInput> bricks, float background) {
-  std::erase_if(bricks, [](const BrickInput& b) { return b.active.count() == 0; });
-  SparseVolume volume;
-  volume.background = background;
-  if (bricks.empty()) return volume;
+void BrickIndex::append(std::span<const Coord> bricks) {
+  const std::size_t first = bricks_.size();
+  add(bricks);
+  if (2 * bricks_.size() > slots_.size()) return rehash();
+  for (std::size_t b = first; b < bricks_.size(); ++b) insert(std::uint32_t(b));
+}
 
-  std::sort(bricks.begin(), bricks.end(),
-            [](const BrickInput& a, const BrickInput& b) { return a.corner < b.corner; });
-  volume.origin = smallestCorner(bricks);
-  refuseTooFarApart(volume.origin, bricks);
+void BrickIndex::insert(std::uint32_t position) {
+  std::size_t slot = hash(bricks_[position]) & mask_;
+  while (slots_[slot] != kNone) slot = (slot + 1) & mask_;
+  slots_[slot] = position;
+}
 
-  volume.bricks.reserve(bricks.size());
-  volume.active.reserve(bricks.size());
-  volume.values.reserve(bricks.size() * kBrickVoxels);
-  for (const auto& brick : bricks) {
-    const Coord place = brickOf(brick.corner - volume.origin);
-    if (!volume.bricks.empty() && volume.bricks.back() == place)
-      throw BadInput("two bricks at " + toString(brick.corner));
-    volume.bricks.push_back(place);
-    volume.active.push_back(brick.active);
-    volume.values.insert(volume.values.end(), brick.values.begin(), brick.values.end());
-  }
-  return volume;
+void BrickIndex::rehash() {
+  slots_.assign(std::bit_ceil(4 * bricks_.size() + 8), kNone);
+  mask_ = slots_.size() - 1;
+  for (std::size_t b = 0; b < bricks_.size(); ++b) insert(std::uint32_t(b));
 }
 
 }  // namespace esvr

@@ -11,7 +11,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/brick_hash.h"
+#include "core/brick_index.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/sparse_volume.h"

@@ -15,7 +15,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/rotation.h"
+#include "core/geometry.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/kernel.h"
 

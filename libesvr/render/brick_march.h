@@ -282,7 +282,7 @@ inline constexpr int kLevels = 8;
 /// The mean of two values. Neither a value nor its mean with itself overflows or is rounded.
 ESVR_HD inline float meanOf(float a, float b) { return 0.5f * a + 0.5f * b; }
 
-/// The mean of eight voxels by the numbers of their corners (core/cell_corner.h). All code that
+/// The mean of eight voxels by the numbers of their corners (core/geometry.h). All code that
 /// averages uses it, level after level, so that voxels have the same bits however they were made.
 ESVR_HD inline float meanOf(const float (&v)[8]) {
   return meanOf(meanOf(meanOf(v[0], v[1]), meanOf(v[2], v[3])),

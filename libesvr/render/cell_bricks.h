@@ -89,7 +89,7 @@ struct BrickAtlas {
 // Bricks of voxels of coarser levels of detail.
 
 /// Averages the voxels of a brick. The results are an eighth of a brick of the next coarser level.
-/// \param corner  the eighth: the corner of the coarser brick (core/cell_corner.h) where it lies
+/// \param corner  the eighth: the corner of the coarser brick (core/geometry.h) where it lies
 /// \param coarser  output
 void averageInto(std::span<const float, kBrickVoxels> voxels, int corner,
                  std::span<float, kBrickVoxels> coarser);

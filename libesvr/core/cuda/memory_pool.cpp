@@ -1,13 +1,11 @@
-#include "core/cuda/memory_pool.h"
-
-#include <cuda_runtime_api.h>
+/// The pool of device memory (device_buffer.h).
 
 #include <cstdint>
 #include <limits>
 #include <map>
 #include <mutex>
 
-#include "core/cuda/check.h"
+#include "core/cuda/device_buffer.h"
 
 namespace esvr::cuda {
 namespace {

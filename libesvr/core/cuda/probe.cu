@@ -1,12 +1,13 @@
+/// The devices that the CUDA runtime finds on this machine.
+
 #include <cuda_runtime_api.h>
 
 #include <fstream>
 #include <regex>
 #include <string>
 
-#include "core/cuda/check.h"
-#include "core/cuda/use_device.h"
-#include "core/cuda_probe.h"
+#include "core/cuda/runtime.h"
+#include "core/device_choice.h"
 #include "esvr/device.h"
 
 namespace esvr {

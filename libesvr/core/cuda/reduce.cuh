@@ -1,15 +1,23 @@
 #pragma once
-/// Reductions and running sums over the lanes of a warp, and reductions over the threads of a
-/// block. Each has one order, so that sums of floating-point numbers are the same bits in every
-/// run.
+/// Numbers of threads and warps, reductions and running sums over the lanes of a warp, and reductions over
+/// the threads of a block. Each has one order, so that sums of floating-point numbers are the same bits in
+/// every run.
 
 #include <cub/block/block_reduce.cuh>
 
+#include <cstddef>
 #include <cstdint>
 
-#include "core/cuda/launch.h"
+#include "core/cuda/runtime.h"
 
 namespace esvr::cuda {
+
+/// Which of all threads or warps of a launch this is, and how many warps there are, in 64 bits.
+__device__ inline std::size_t threadNumber() {
+  return std::size_t(blockIdx.x) * blockDim.x + threadIdx.x;
+}
+__device__ inline std::size_t warpNumber() { return threadNumber() / kWarp; }
+__device__ inline std::size_t warpCount() { return std::size_t(gridDim.x) * blockDim.x / kWarp; }
 
 inline constexpr unsigned kAllLanes = 0xffffffffu;
 

@@ -71,7 +71,7 @@ struct CellField {
   std::vector<Coord> origins;                   ///< origins of the chunks
   std::vector<std::uint32_t> begin;             ///< by brick: its entries are [b] to [b + 1] - 1
   std::vector<std::uint32_t> ellipsoid;         ///< by entry
-  /// By brick: bit c is set if voxels in the brick of corner c (core/cell_corner.h) may differ from
+  /// By brick: bit c is set if voxels in the brick of corner c (core/geometry.h) may differ from
   /// the background. Empty: all may.
   std::vector<std::uint8_t> corners;
   /// The masks by which voxels are active, or the levels of their thresholds (block_levels.h), and

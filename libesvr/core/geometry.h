@@ -1,12 +1,31 @@
 #pragma once
-/// Rotations as quaternions and as matrices, in float64, for host and device.
+/// Numbers of axes and of the corners of a cell, and rotations in float64. The code is compiled for host
+/// and device.
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 
+#include "esvr/coord.h"
 #include "esvr/kernel.h"
 
 namespace esvr {
+
+/// The components of a coordinate by number: 0 is x, 1 is y, 2 is z.
+using CoordAxis = std::int32_t Coord::*;
+inline constexpr CoordAxis kAxes[] = {&Coord::x, &Coord::y, &Coord::z};
+
+/// A cell is the cube between eight neighbouring voxels. A corner has the number 4 x + 2 y + z, where x, y
+/// and z are 0 for the lowest corner and 1 for those above it along the axis. A brick and its neighbours
+/// are numbered in the same way.
+inline constexpr int kCellCorners = 8;
+
+/// The step from the lowest corner to a corner.
+[[nodiscard]] ESVR_HD inline Coord stepToCorner(int corner) {
+  return {corner >> 2, (corner >> 1) & 1, corner & 1};
+}
+/// The number of the corner to which a step leads.
+[[nodiscard]] ESVR_HD inline int cornerAt(Coord step) { return step.x << 2 | step.y << 1 | step.z; }
 
 /// A 3x3 matrix, row by row.
 using Matrix3 = std::array<double, 9>;

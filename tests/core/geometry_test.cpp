@@ -1,8 +1,16 @@
-#include "esvr/coord.h"
+// Plan: coordinates and boxes have the results of their definitions, also at the ends of the index space.
+// The numbers of corners are compared with their definition, 4 x + 2 y + z. Each voxel of a brick lies in
+// the block of its coordinates; the thresholds are those of the formula in float64.
+
+#include "core/geometry.h"
 
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+
+#include "esvr/block_levels.h"
+#include "esvr/coord.h"
 
 namespace esvr {
 namespace {
@@ -56,6 +64,37 @@ TEST(Box, CountsTheVoxelsOfTheWholeIndexSpace) {
   // The volume is 2^32 cubed. Integers would overflow with the first side.
   const Box box{kFarLow, kFarHigh};
   EXPECT_EQ(box.volume(), 0x1p96);
+}
+
+TEST(CellCorner, isNumberedWithZFastest) {
+  int number = 0;
+  for (int x = 0; x < 2; ++x)
+    for (int y = 0; y < 2; ++y)
+      for (int z = 0; z < 2; ++z, ++number) {
+        EXPECT_EQ(stepToCorner(number), (Coord{x, y, z}));
+        EXPECT_EQ(cornerAt({x, y, z}), number);
+      }
+  EXPECT_EQ(number, kCellCorners);
+}
+
+TEST(BlockLevels, EachVoxelLiesInTheBlockOfItsCoordinates) {
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const Coord at = voxelLocal(v);
+    EXPECT_EQ(blockOf(v), (at.x / 4 * 2 + at.y / 4) * 2 + at.z / 4) << v;
+  }
+  BlockLevels levels;
+  levels.of[5] = 17;
+  EXPECT_EQ(levels.at(voxelOffset({4, 3, 7})), 17);
+  EXPECT_EQ(levels.at(voxelOffset({4, 4, 7})), 0);
+}
+
+// A root is rounded once, and so is its product with the base: two half units in the last place.
+TEST(BlockLevels, AThresholdDoublesEveryFourLevels) {
+  for (const float base : {1.0f, 0.37f, 3e-9f, 5e20f})
+    for (int level = 0; level < kLevelCount; ++level) {
+      const double expected = double(base) * std::exp2(level / 4.0);
+      EXPECT_NEAR(thresholdAt(base, level), expected, expected * 0x1p-23) << base << ", " << level;
+    }
 }
 
 }  // namespace
