@@ -4,7 +4,7 @@
 #include <array>
 #include <utility>
 
-#include "codec/symbol_coder.h"
+#include "codec/range_coder.h"
 
 namespace esvr::codec {
 namespace {

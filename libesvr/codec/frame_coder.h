@@ -9,14 +9,11 @@
 #include <vector>
 
 #include "codec/past_voxels.h"
-#include "codec/symbol_coder.h"
+#include "codec/range_coder.h"
 #include "esvr/coord.h"
 #include "esvr/voxel_layer.h"
 
 namespace esvr::codec {
-
-/// Largest motion of a brick along an axis, in voxels.
-inline constexpr int kLargestMotion = 4;
 
 /// What chooseFrameCodes() weighs.
 struct FrameThrift {

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "codec/brick_coder.h"
-#include "codec/brick_order.h"
 #include "core/axes.h"
 #include "core/brick_index.h"
 #include "esvr/error.h"

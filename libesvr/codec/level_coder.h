@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "codec/symbol_coder.h"
+#include "codec/range_coder.h"
 #include "esvr/block_levels.h"
 #include "esvr/coord.h"
 

@@ -1,10 +1,12 @@
 #pragma once
 /// The voxels that a frame refers to, as numbers on the lattice of the frame that is coded. They are
-/// those of the previous frame, or those of another grid whose values are mapped.
+/// those of the previous frame, or those of another grid whose values are mapped. A brick may have moved since.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 
 #include "core/brick_index.h"
 #include "esvr/voxel_layer.h"
@@ -72,6 +74,29 @@ class PastVoxels {
   Coord shift_;                ///< what is added to places in the previous frame, in bricks
   double vacantPlace_ = 0.0;   ///< place of voxels that are vacant or have no brick
   VoxelArray<double> places_;  ///< places of all voxels of the previous frame
+};
+
+// ---- Motion
+
+/// Largest motion of a brick along an axis, in voxels.
+inline constexpr int kLargestMotion = 4;
+
+/// Finds the motion of a brick since the previous frame.
+class MotionSearch {
+ public:
+  explicit MotionSearch(const PastVoxels& past)
+      : past_(past), cube_(std::make_unique<PastCube<kLargestMotion>>()) {}
+
+  /// The motion found from which the previous frame differs least from a brick. The search descends
+  /// from no motion and from `expected`, which is taken unless another one is clearly better.
+  [[nodiscard]] Coord find(Coord brick, std::span<const std::int32_t> codes, Coord expected);
+
+ private:
+  [[nodiscard]] double costOf(Coord motion, std::span<const std::int32_t> codes,
+                              Coord expected) const;
+
+  const PastVoxels& past_;
+  std::unique_ptr<PastCube<kLargestMotion>> cube_;
 };
 
 }  // namespace esvr::codec

@@ -1,3 +1,8 @@
+// A mask of active voxels that takes fewer bytes than that of a volume and is nearly the same. The bits of a mask are
+// estimated with the contexts of the voxel coder and the state in an expected mask. Each change of a block of
+// voxels has a price by how much its values matter, and is made if it saves more bits. The price falls until hardly
+// more of the overlap may be given up.
+
 #include "esvr/simplified_mask.h"
 
 #include <tbb/task_arena.h>
@@ -6,21 +11,18 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <limits>
 #include <optional>
 
-#include "codec/mask_costs.h"
 #include "core/axes.h"
 #include "core/brick_index.h"
 #include "core/parallel.h"
 
 namespace esvr {
 namespace {
-
-using codec::MaskCosts;
-using codec::MaskCounts;
-using codec::MaskCube;
 
 // docs/lab-notes.md, "Simplified masks", compares other moves and schedules.
 /// Sides of the blocks that are changed together, in the order of the moves.
@@ -40,6 +42,135 @@ constexpr double kBlur = 0.5;
 constexpr double kLeastError = std::numeric_limits<float>::denorm_min();
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kColors = 8;
+
+// ---- The bits that a mask takes
+
+/// A brick with one layer of the voxels around it.
+class MaskCube {
+ public:
+  static constexpr int kSide = kBrickSide + 2;
+  static constexpr int kCells = kSide * kSide * kSide;
+  static constexpr int kBricks = 27;  ///< the brick itself and those around it
+
+  /// The step to one of these bricks, from -1 to 1 along each axis.
+  [[nodiscard]] static Coord step(int brick) {
+    return {brick / 9 - 1, brick / 3 % 3 - 1, brick % 3 - 1};
+  }
+
+  /// The masks of a brick; null: there is none.
+  struct Masks {
+    const BrickMask* own = nullptr;
+    const BrickMask* expected = nullptr;  ///< a guess of it that a decoder has too
+  };
+
+  /// \param find  find(step) returns the Masks of the brick at a step
+  template <class Find>
+  void fill(const Find& find) {
+    for (int n = 0; n < kBricks; ++n) fillPart(step(n), find(step(n)));
+  }
+
+  /// Place of a voxel, whose coordinates are from -1 to kBrickSide.
+  [[nodiscard]] static std::size_t at(int x, int y, int z) {
+    return std::size_t(((x + 1) * kSide + y + 1) * kSide + z + 1);
+  }
+
+  [[nodiscard]] bool active(std::size_t at) const { return active_[at] != 0; }
+  void set(std::size_t at, bool active) { active_[at] = active; }
+  /// False if no brick has the voxel, which takes no bits then.
+  [[nodiscard]] bool isCoded(std::size_t at) const { return coded_[at] != 0; }
+
+  /// The context of a voxel with coordinates from 0 to kBrickSide.
+  [[nodiscard]] std::size_t context(std::size_t at) const {
+    std::size_t bits = expected_[at];
+    for (const std::size_t back : kBack) bits = bits << 1 | active_[at - back];
+    return bits;
+  }
+
+ private:
+  static constexpr std::size_t kX = std::size_t(kSide) * kSide, kY = kSide;
+  /// The voxels before a voxel, in the order of Halo::activityAround() (codec/voxel_coder.h).
+  static constexpr std::array kBack{kX, kY, std::size_t{1}, kX + kY, kX + 1, kY + 1, kX + kY + 1};
+
+  /// The coordinates of the voxels of a cube that lie in the brick at a step.
+  struct Interval {
+    int first, last;
+  };
+  static Interval within(int step) {
+    if (step < 0) return {-1, -1};
+    return step > 0 ? Interval{kBrickSide, kBrickSide} : Interval{0, kBrickSide - 1};
+  }
+
+  void fillPart(Coord step, const Masks& masks) {
+    const auto in = [](const BrickMask* mask, Coord voxel) {
+      return mask && mask->test(voxelOffset(localOf(voxel)));
+    };
+    const Interval xs = within(step.x), ys = within(step.y), zs = within(step.z);
+    for (int x = xs.first; x <= xs.last; ++x)
+      for (int y = ys.first; y <= ys.last; ++y)
+        for (int z = zs.first; z <= zs.last; ++z) {
+          active_[at(x, y, z)] = in(masks.own, {x, y, z});
+          expected_[at(x, y, z)] = in(masks.expected, {x, y, z});
+          coded_[at(x, y, z)] = masks.own != nullptr;
+        }
+  }
+
+  std::array<std::uint8_t, kCells> active_{}, coded_{}, expected_{};
+};
+
+/// The bits of a voxel by its context and its state.
+struct MaskCosts {
+  static constexpr std::size_t kContexts = 256;
+
+  std::array<std::array<float, 2>, kContexts> bits{};
+
+  [[nodiscard]] float of(const MaskCube& cube, std::size_t at) const {
+    return cube.isCoded(at) ? bits[cube.context(at)][cube.active(at)] : 0.0f;
+  }
+};
+
+/// Counts of the contexts and states of the voxels of bricks.
+class MaskCounts {
+ public:
+  void add(const MaskCube& cube) {
+    for (int x = 0; x < kBrickSide; ++x)
+      for (int y = 0; y < kBrickSide; ++y)
+        for (int z = 0; z < kBrickSide; ++z) {
+          const std::size_t at = MaskCube::at(x, y, z);
+          ++counts_[cube.context(at)][cube.active(at)];
+        }
+  }
+
+  /// Adds a brick whose voxels are, like those around it, all in one state.
+  /// \param expected  the state of all of its voxels in the expected mask
+  void addUniform(bool active, bool expected) {
+    constexpr std::size_t kStates = MaskCosts::kContexts / 2;
+    counts_[(expected ? kStates : 0) + (active ? kStates - 1 : 0)][active] += kBrickVoxels;
+  }
+
+  void add(const MaskCounts& other) {
+    for (std::size_t c = 0; c < counts_.size(); ++c)
+      for (std::size_t state = 0; state < 2; ++state) counts_[c][state] += other.counts_[c][state];
+  }
+
+  [[nodiscard]] MaskCosts costs() const {
+    MaskCosts costs;
+    for (std::size_t c = 0; c < counts_.size(); ++c) {
+      const double all = double(counts_[c][0] + counts_[c][1]) + 2.0 * kPrior;
+      for (std::size_t state = 0; state < 2; ++state)
+        costs.bits[c][state] = float(-std::log2((double(counts_[c][state]) + kPrior) / all));
+    }
+    return costs;
+  }
+
+ private:
+  /// What is added to each count, so that nothing is impossible (the estimator of Krichevsky and
+  /// Trofimov).
+  static constexpr double kPrior = 0.5;
+
+  std::array<std::array<std::uint64_t, 2>, MaskCosts::kContexts> counts_{};
+};
+
+// ---- What a change costs, and what it saves
 
 /// The values of a volume as prices of changes of its mask.
 class Prices {

@@ -1,3 +1,6 @@
+// The coder of voxels: what a block may look at, copies of bricks, predictions, and the decisions for one voxel after
+// the other. The same code writes, reads and chooses codes.
+
 #include "codec/voxel_coder.h"
 
 #include <algorithm>
@@ -9,8 +12,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "codec/brick_order.h"
-#include "codec/voxel_halo.h"
+#include "codec/brick_coder.h"
 #include "core/axes.h"
 #include "core/brick_index.h"
 #include "core/parallel.h"
@@ -18,6 +20,8 @@
 
 namespace esvr::codec {
 namespace {
+
+// ---- Blocks
 
 /// Most bricks of a block, which have 2^20 voxels. Smaller blocks learn their models less well
 /// (docs/lab-notes.md, "Blocks of voxels").
@@ -64,6 +68,8 @@ struct OwnBricks {
 
   [[nodiscard]] std::uint32_t find(Coord brick) const { return blocks.find(brick, block); }
 };
+
+// ---- Mirror images
 
 /// The mirror image of a voxel, if it was coded before the voxel.
 struct Image {
@@ -112,6 +118,8 @@ class Mirrors {
   std::uint32_t last_ = BrickIndex::kNone;
   bool any_;
 };
+
+// ---- Copies
 
 /// The source of a copy is a number: 0, 1 and 2 are the neighbours along x, y and z, and this one
 /// stands for the mirror images.
@@ -201,6 +209,8 @@ class BrickCopies {
   Mirrors& mirrors_;
 };
 
+// ---- Predictions
+
 /// Predicts the code of a voxel from the voxels before it and from its mirror image. Of several
 /// predictions it takes the one with the smallest recent error. Only integers are used
 /// (docs/format.md, "Voxels").
@@ -278,6 +288,8 @@ class VoxelPredictor {
   std::size_t first_ = 0;  ///< index of the first prediction that exists
   std::size_t best_ = 0;
 };
+
+// ---- Voxels
 
 // Numbers of contexts. The image of a voxel is missing, inactive or active. For vacancy it is
 // missing, or has one of four combinations of activity and code.

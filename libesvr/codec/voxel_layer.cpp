@@ -1,235 +1,114 @@
+// The values that the codes of a voxel layer stand for, and the volume that a layer holds.
+
 #include "esvr/voxel_layer.h"
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <optional>
-#include <unordered_set>
 
 #include "codec/voxel_values.h"
 #include "core/parallel.h"
-#include "esvr/error.h"
 
 namespace esvr {
+namespace codec {
 namespace {
 
-constexpr std::size_t kLargestPalette = 4096;
-constexpr double kErrorOfBound = 0.577;  // error of rounding: 1 / sqrt(3) of the bound
-constexpr double kMargin = 1.0 - 1e-6;   // factor of a bound, which leaves room for rounding
+constexpr double kLargestCode = 0x1p30;
+constexpr int kFloatMantissa = 23, kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
+constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfBits = 0x7fff;
 
-bool sameBits(float a, float b) {
-  return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
-}
-
-/// The distinct values of a volume in increasing order; empty if there are too many for a palette.
-std::vector<float> paletteOf(const SparseVolume& volume) {
-  std::unordered_set<std::int32_t> orders;
-  std::optional<std::int32_t> last;
-  for (const float v : volume.values) {
-    const std::int32_t order = codec::orderOfFloat(v);
-    if (last == order) continue;
-    orders.insert(*(last = order));
-    if (orders.size() > kLargestPalette) return {};
-  }
-  std::vector<float> values;
-  for (const std::int32_t order : orders) values.push_back(codec::floatAt(order));
-  std::sort(values.begin(), values.end(), codec::inOrder);
-  return values;
-}
-
-bool allHalves(const SparseVolume& volume) {
-  return std::all_of(volume.values.begin(), volume.values.end(),
-                     [](float v) { return sameBits(codec::halfAt(codec::orderOfHalf(v)), v); });
-}
-
-/// The code of a value. With kKept, the code of a negative value is negative.
-std::int32_t roundedCode(const VoxelLayer& layer, float value, RoundedSigns signs) {
-  const std::int32_t code = codec::codeOfValue(layer, value);
-  return signs == RoundedSigns::kKept && value < 0.0f ? std::min(code, -1) : code;
-}
-
-void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
-  layer.origin = volume.origin;
-  layer.background = volume.background;
-  layer.bricks = volume.bricks;
-  layer.active = volume.active;
-  layer.vacant.resize(volume.brickCount());
-  layer.codes = VoxelArray<std::int32_t>(volume.values.size(), memoryOf(volume));
-  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
-        layer.vacant[b].set(v);
-      layer.codes[b * kBrickVoxels + std::size_t(v)] = roundedCode(layer, values[v], signs);
-    }
-  });
-}
-
-/// The largest error that rounding the values of a quantisation lattice to float32 adds.
-double roundingError(const SparseVolume& volume, double bound) {
-  double largest = 0.0;
-  for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
-  return (largest + bound) * 0x1p-24;
-}
-
-/// The largest bound on values before they are rounded to halfs, with which the bound usually holds
-/// for the halfs. Where halfs are u apart and the source's value is a half, a value that is d off is
-/// off by a multiple of u after it is rounded, which exceeds the bound unless d is below
-/// (floor(bound / u) + 1/2) u.
-double boundBeforeRounding(const SparseVolume& volume, double bound) {
-  constexpr int kMantissa = 10, kLowest = -14, kHighest = 15;  // of a half: bits, exponents
-  double largest = 0.0;
-  for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
-  // A value that is off by the bound may lie beyond the next power of 2, where halfs are farther apart.
-  const int last =
-      largest + bound > 0x1p-14 ? std::min(std::ilogb(largest + bound), kHighest) : kLowest;
-  double before = bound;
-  for (int exponent = kLowest; exponent <= last; ++exponent) {
-    const double apart = std::ldexp(1.0, exponent - kMantissa);
-    before = std::min(before, (std::floor(bound / apart) + 0.5) * apart);
-  }
-  return before;
-}
-
-/// The voxels of a volume, rounded to multiples of two half steps.
-VoxelLayer quantised(const SparseVolume& volume, double halfStep, RoundedSigns signs) {
-  VoxelLayer layer;
-  layer.form = VoxelForm::kQuantised;
-  layer.divisor = 0.5 / halfStep;
-  fill(volume, signs, layer);
-  return layer;
-}
-
-bool isVacant(const VoxelLayer& layer, std::size_t b) {
-  return layer.vacant[b].count() == kBrickVoxels;
-}
-
-/// Removes the bricks that hold nothing but the background.
-void dropVacant(VoxelLayer& layer) {
-  std::size_t kept = 0;
-  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
-    if (isVacant(layer, b)) continue;
-    layer.bricks[kept] = layer.bricks[b];
-    layer.active[kept] = layer.active[b];
-    layer.vacant[kept] = layer.vacant[b];
-    const auto from = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
-    std::copy_n(from, kBrickVoxels, layer.codes.begin() + std::ptrdiff_t(kept * kBrickVoxels));
-    ++kept;
-  }
-  layer.bricks.resize(kept);
-  layer.active.resize(kept);
-  layer.vacant.resize(kept);
-  layer.codes.resize(kept * kBrickVoxels);
-}
-
-/// The voxels that differ from the background by more than a bound.
-std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
-  std::vector<BrickMask> masks(volume.brickCount());
-  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (std::abs(double(values[v]) - volume.background) > bound) masks[b].set(v);
-  });
-  return masks;
-}
-
-/// Makes all voxels outside a box inactive.
-void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
-  parallelFor(std::size_t{0}, masks.size(), [&](std::size_t b) {
-    const BrickMask all = masks[b];
-    masks[b] = {};
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (all.test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v))) masks[b].set(v);
-  });
-}
-
-/// The simplified mask and those of the volume's active voxels that differ.
-std::vector<BrickMask> withDiffering(const SparseVolume& volume, std::span<const BrickMask> mask,
-                                     const std::vector<BrickMask>& differing) {
-  std::vector<BrickMask> masks(mask.begin(), mask.end());
-  for (std::size_t b = 0; b < masks.size(); ++b)
-    for (std::size_t w = 0; w < masks[b].words.size(); ++w)
-      masks[b].words[w] |= volume.active[b].words[w] & differing[b].words[w];
-  return masks;
-}
-
-/// Gives a layer these active voxels. Of the others, those that do not differ from the background
-/// become vacant.
-void activate(const SparseVolume& volume, const std::vector<BrickMask>& active,
-              const std::vector<BrickMask>& differing, VoxelLayer& layer) {
-  const std::int32_t background = codec::codeOfValue(layer, volume.background);
-  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    layer.active[b] = active[b];
-    layer.vacant[b] = {};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (active[b].test(v) || differing[b].test(v)) continue;
-      layer.vacant[b].set(v);
-      layer.codes[b * kBrickVoxels + std::size_t(v)] = background;
-    }
-  });
-  dropVacant(layer);
-}
-
-void activateByValue(const SparseVolume& volume, double bound, Activity activity,
-                     const SimplifiedMasks* simplified, VoxelLayer& layer) {
-  const auto differs = differing(volume, bound);
-  auto active = differs;
-  clip(volume, activeBox(volume), active);
-  if (activity == Activity::kAuto && !overlapOf(volume.active, active).suffices()) {
-    const SimplifiedMasks own(volume);
-    const auto mask = (simplified ? *simplified : own).forError(kErrorOfBound * bound);
-    active = withDiffering(volume, mask, differs);
-  }
-  activate(volume, active, differs, layer);
+/// The number of a float in increasing order. -0 comes before 0, so every bit pattern has its own.
+std::int32_t orderOf(std::int32_t magnitude, bool negative) {
+  return negative ? -1 - magnitude : magnitude;
 }
 
 }  // namespace
 
-VoxelLayer exactLayer(const SparseVolume& volume) {
-  VoxelLayer layer;
-  layer.palette = paletteOf(volume);
-  layer.form = !layer.palette.empty() ? VoxelForm::kPalette
-               : allHalves(volume)    ? VoxelForm::kHalf
-                                      : VoxelForm::kFloat;
-  fill(volume, RoundedSigns::kMayChange, layer);
-  return layer;
+float floatAt(std::int32_t n) {
+  const auto magnitude = std::uint32_t(n < 0 ? -1 - n : n);
+  return std::bit_cast<float>(n < 0 ? magnitude | 0x80000000u : magnitude);
+}
+std::int32_t orderOfFloat(float v) {
+  return orderOf(std::int32_t(std::bit_cast<std::uint32_t>(v) & 0x7fffffffu), std::signbit(v));
 }
 
-VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
-                        RoundedSigns signs, const SimplifiedMasks* simplified,
-                        DecodedValues decoded) {
-  if (!(std::isfinite(bound) && bound > 0.0))
-    throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
-  const bool halfs = decoded == DecodedValues::kHalfs;
-  // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
-  // bound where they are rounded to float32; the second lattice is finer and leaves room for that.
-  // A negative value near 0 that keeps its sign is up to a whole step off. The half that is nearest
-  // to a code's value is at most twice as far from the source's half as this value, so that the last
-  // lattice keeps the bound where values that lie on two sides of a power of 2 miss it.
-  const double side = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * kMargin;
-  const double halfStep = side * (halfs ? boundBeforeRounding(volume, bound) : bound);
-  std::vector<double> halfSteps{halfStep, halfStep - roundingError(volume, bound)};
-  if (halfs) halfSteps.push_back(0.5 * side * bound);
-  for (const double h : halfSteps) {
-    if (!(h > 0.0)) break;
-    VoxelLayer layer = quantised(volume, h, signs);
-    if (activity != Activity::kExact)
-      activateByValue(volume, side * bound, activity, simplified, layer);
-    SparseVolume made = volumeOf(layer);
-    if (halfs) roundToHalfs(made);
-    if (largestDifference(volume, made) <= bound) return layer;
+bool inOrder(float a, float b) { return orderOfFloat(a) < orderOfFloat(b); }
+
+/// The bits of a half, moved to those of a float, are the half times 2^-112, which is the
+/// difference of the exponents' offsets. The product is exact, also for subnormal halves.
+float halfAt(std::int32_t n) {
+  const std::int32_t bits = (n < 0 ? -1 - n : n) & kHalfBits;
+  const auto moved = std::bit_cast<float>(std::uint32_t(bits) << (kFloatMantissa - kHalfMantissa));
+  return std::copysign(moved * 0x1p112f, n < 0 ? -1.0f : 1.0f);
+}
+std::int32_t orderOfHalf(float v) {
+  const double magnitude = std::abs(double(v));
+  int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;
+  exponent = std::clamp(exponent, kHalfLowest, kHalfHighest);
+  const double mantissa = std::floor(std::ldexp(magnitude, kHalfMantissa - exponent));
+  const auto steps = std::int32_t(std::min(mantissa, 2.0 * kHalfOne - 1.0));
+  const bool subnormal = steps < kHalfOne;
+  const std::int32_t bits =
+      subnormal ? steps : ((exponent + kHalfHighest) << kHalfMantissa) + steps - kHalfOne;
+  return orderOf(bits, std::signbit(v));
+}
+
+float nearestHalf(float v) {
+  constexpr float kLargest = 65504.0f, kSmallestNormal = 0x1p-14f, kSmallest = 0x1p-24f;
+  // Between 0.5 and 1, floats are as far apart as subnormal halfs. Adding this number rounds to them.
+  constexpr float kRounder = 0.75f;
+  constexpr int kDropped = kFloatMantissa - kHalfMantissa;
+  constexpr std::uint32_t kBelowTie = (1u << (kDropped - 1)) - 1u,
+                          kDroppedBits = (1u << kDropped) - 1u;
+  const float magnitude = std::abs(v);
+  if (!(magnitude < kLargest)) return std::isnan(v) ? v : std::copysign(kLargest, v);
+  float rounded = 0.0f;
+  if (magnitude < kSmallestNormal) {
+    rounded = (magnitude + kRounder) - kRounder;
+  } else {
+    const auto bits = std::bit_cast<std::uint32_t>(magnitude);
+    const std::uint32_t even = (bits >> kDropped) & 1u;
+    rounded = std::bit_cast<float>((bits + kBelowTie + even) & ~kDroppedBits);
   }
-  return exactLayer(volume);
+  if (rounded == 0.0f && v < 0.0f) rounded = kSmallest;
+  return std::copysign(std::min(rounded, kLargest), v);
 }
 
-void roundToHalfs(SparseVolume& volume) {
-  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (volume.active[b].test(v)) values[v] = codec::nearestHalf(values[v]);
-  });
+float valueOfCode(const VoxelLayer& layer, std::int32_t n) {
+  switch (layer.form) {
+    case VoxelForm::kQuantised: {
+      // The code next to the largest float may stand for a larger number, which no float holds.
+      constexpr double kLargest = std::numeric_limits<float>::max();
+      return float(std::clamp(double(n) / layer.divisor, -kLargest, kLargest));
+    }
+    case VoxelForm::kHalf:
+      return halfAt(n);
+    case VoxelForm::kPalette:
+      return layer.palette[std::size_t(n)];
+    case VoxelForm::kFloat:
+      break;
+  }
+  return floatAt(n);
 }
+
+std::int32_t codeOfValue(const VoxelLayer& layer, float v) {
+  switch (layer.form) {
+    case VoxelForm::kQuantised:
+      return std::int32_t(
+          std::lround(std::clamp(double(v) * layer.divisor, -kLargestCode, kLargestCode)));
+    case VoxelForm::kHalf:
+      return orderOfHalf(v);
+    case VoxelForm::kPalette:
+      return std::int32_t(std::lower_bound(layer.palette.begin(), layer.palette.end(), v, inOrder) -
+                          layer.palette.begin());
+    case VoxelForm::kFloat:
+      break;
+  }
+  return orderOfFloat(v);
+}
+
+}  // namespace codec
 
 SparseVolume volumeOf(const VoxelLayer& layer) {
   SparseVolume volume;
@@ -248,49 +127,20 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   return volume;
 }
 
+void roundToHalfs(SparseVolume& volume) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v)) values[v] = codec::nearestHalf(values[v]);
+  });
+}
+
 bool allFinite(const VoxelLayer& layer) {
   for (std::size_t i = 0; i < layer.codes.size(); ++i)
     if (!std::isfinite(codec::valueOfCode(layer, layer.codes[i])) &&
         !layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels)))
       return false;
   return true;
-}
-
-namespace {
-
-/// The largest difference over brick i of `a`.
-double largestOver(const SparseVolume& a, std::size_t i, const SparseVolume& b) {
-  const auto at = findBrick(b, brickOf(a.brickCorner(i)) - brickOf(b.origin));
-  double largest = 0.0;
-  for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-    const float other = at ? b.brickValues(*at)[v] : b.background;
-    largest = std::max(largest, std::abs(double(a.brickValues(i)[v]) - double(other)));
-  }
-  return largest;
-}
-
-/// The largest difference over the bricks of `a`.
-double largestOver(const SparseVolume& a, const SparseVolume& b) {
-  using BrickRange = tbb::blocked_range<std::size_t>;
-  const auto largest = [](double x, double y) { return std::max(x, y); };
-  return parallelReduce(
-      BrickRange(0, a.brickCount()), 0.0,
-      [&](const BrickRange& bricks, double found) {
-        for (std::size_t i = bricks.begin(); i != bricks.end(); ++i)
-          found = largest(found, largestOver(a, i, b));
-        return found;
-      },
-      largest);
-}
-
-}  // namespace
-
-double largestDifference(const SparseVolume& a, const SparseVolume& b) {
-  return std::max(largestOver(a, b), largestOver(b, a));
-}
-
-double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
-  return largestDifference(volume, volumeOf(layer));
 }
 
 }  // namespace esvr

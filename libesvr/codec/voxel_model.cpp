@@ -1,3 +1,5 @@
+// The model of a layer, which an encoder chooses: the frequent codes and the mirrors.
+
 #include "codec/voxel_coder.h"
 
 #include <algorithm>

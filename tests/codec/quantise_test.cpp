@@ -10,9 +10,8 @@
 #include <cmath>
 
 #include "../field/random_field.h"
-#include "codec/lattice_bits.h"
-#include "codec/rounding.h"
-#include "codec/sorted_axes.h"
+#include "codec/lattice.h"
+#include "codec/quantise.h"
 #include "esvr/error.h"
 
 namespace esvr {

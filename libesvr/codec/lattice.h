@@ -1,5 +1,5 @@
 #pragma once
-/// Computes the number of bits of each parameter of an ellipsoid. Only integers are used, so that
+/// The quantisation lattice of ellipsoids: the number of bits of each of their parameters. Only integers are used, so that
 /// writer and reader get the same numbers (docs/format.md, "The quantisation lattice").
 ///
 /// An error of a center matters less along a long axis of its ellipsoid than along a short one, and

@@ -1,7 +1,7 @@
 // Plan: along a line, the activities that are carried over from voxel to voxel are those that are
 // gathered from the halo, for random activities. The cells before a brick are those of no voxel.
 
-#include "codec/voxel_halo.h"
+#include "codec/voxel_coder.h"
 
 #include <gtest/gtest.h>
 

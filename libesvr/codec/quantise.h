@@ -1,12 +1,23 @@
 #pragma once
-/// The errors that the coordinates of a center or a rotation may have together, and targets for
-/// rounding them one after the other.
+/// What quantise() rounds: one of the 24 combinations of scales and rotation that describe the same ellipsoid, and
+/// coordinates whose errors are coupled, one after the other.
 
 #include <array>
+#include <cstddef>
 
-#include "codec/sorted_axes.h"
+#include "esvr/ellipsoids.h"
 
 namespace esvr {
+
+struct SortedAxes {
+  std::array<double, 3> logScale;  ///< decreasing
+  std::array<double, 4> rotation;  ///< unit quaternion w, x, y, z with w >= |x|, |y|, |z|
+};
+
+/// Sorts the axes by decreasing scale. Half turns about the axes do not change an ellipsoid; of the
+/// quaternions that they lead to, the one whose w is the largest component is taken. Its other
+/// components are at most sqrt(1/2) in magnitude.
+[[nodiscard]] SortedAxes sortedAxes(const Ellipsoids& e, std::size_t i);
 
 /// Rounds three coupled coordinates in the order 0, 1, 2. The error of the first ones moves the
 /// targets of the others to where the weighted error of all three is smallest.
