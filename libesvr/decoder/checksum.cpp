@@ -1,7 +1,7 @@
-// The checksum of the file format (format/checksum.h) in the decoder-only build: XXH64 after its
+// The checksum of the file format (format/bytes.h) in the decoder-only build: XXH64 after its
 // specification (Y. Collet, "xxHash fast digest algorithm", version 0.2).
 
-#include "format/checksum.h"
+#include "format/bytes.h"
 
 #include <algorithm>
 #include <array>
@@ -37,7 +37,7 @@ std::uint64_t avalanche(std::uint64_t hash) {
 
 }  // namespace
 
-/// The name is that of xxHash's state, which format/checksum.h declares.
+/// The name is that of xxHash's state, which format/bytes.h declares.
 struct XXH64_state_s {
   std::array<std::uint64_t, kLanes> lanes{kPrime1 + kPrime2, kPrime2, 0, 0 - kPrime1};
   std::array<std::byte, kStripe> rest{};  ///< bytes after the last whole stripe

@@ -10,7 +10,7 @@
 
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "format/codec.h"
+#include "format/section_table.h"
 
 namespace esvr::format {
 namespace {

@@ -1,4 +1,4 @@
-#include "format/checksum.h"
+#include "format/bytes.h"
 
 #include <xxhash.h>
 

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "esvr/container.h"
-#include "format/byte_source.h"
+#include "format/bytes.h"
 
 namespace esvr::format {
 

@@ -1,17 +1,157 @@
+// Blocks of quantised ellipsoids, with their lattice and their boxes, and the bytes that layers and streams take.
+
 #include "format/ellipsoid_block.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
+#include <numeric>
 #include <type_traits>
 
-#include "codec/cell_tree.h"
-#include "codec/lattice_bits.h"
-#include "codec/morton.h"
-#include "codec/symbol_coder.h"
+#include "codec/brick_coder.h"
+#include "codec/lattice.h"
+#include "codec/range_coder.h"
 #include "core/parallel.h"
+#include "core/rotation.h"
+#include "esvr/container.h"
 #include "esvr/error.h"
 
-namespace esvr::format {
+namespace esvr {
+namespace format {
+
+// ---- Boxes
+
+namespace {
+
+using Vec3 = std::array<double, 3>;
+
+std::int32_t clampedFloor(double v) {
+  return std::int32_t(std::clamp(std::floor(v), double(Box::kMin), double(Box::kMax)));
+}
+std::int32_t clampedCeil(double v) {
+  return std::int32_t(std::clamp(std::ceil(v), double(Box::kMin), double(Box::kMax)));
+}
+
+Vec3 centerOf(const Chunk& chunk, std::size_t i) {
+  const auto& c = chunk.ellipsoids.center;
+  return {chunk.origin.x + double(c[0][i]), chunk.origin.y + double(c[1][i]),
+          chunk.origin.z + double(c[2][i])};
+}
+
+/// Grows the box by [center - half, center + half].
+void expand(Box& box, const Vec3& center, const Vec3& half) {
+  box.expand(Coord{clampedFloor(center[0] - half[0]), clampedFloor(center[1] - half[1]),
+                   clampedFloor(center[2] - half[2])});
+  box.expand(Coord{clampedCeil(center[0] + half[0]), clampedCeil(center[1] + half[1]),
+                   clampedCeil(center[2] + half[2])});
+}
+
+/// Half widths of an ellipsoid's bounding box for a support radius of 1: the lengths of the rows of
+/// R S.
+Vec3 unitHalfWidths(const Ellipsoids& e, std::size_t i) {
+  const Matrix3 R =
+      rotationOf({e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]});
+  Vec3 half{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t j = 0; j < 3; ++j)
+      half[a] = std::hypot(half[a], R[3 * a + j] * std::exp(double(e.logScale[j][i])));
+    // A scale that overflows gives 0 * inf; the box is then unbounded.
+    if (std::isnan(half[a])) half[a] = HUGE_VAL;
+  }
+  return half;
+}
+
+/// The radius of the support; 0 for the paper's kernel at a negative kappa, whose support is empty.
+double radiusOf(const Kernel& kernel, double kappa) {
+  const double radius = supportRadius(kernelConstants<double>(kernel, kappa));
+  return radius > 0.0 ? radius : 0.0;
+}
+
+}  // namespace
+
+Box supportBox(const Chunk& chunk, Run run, const Kernel& kernel) {
+  const auto& e = chunk.ellipsoids;
+  const double sceneRadius = radiusOf(kernel, kernel.kappa);
+  Box box;
+  for (std::size_t i = run.first; i < run.first + run.count; ++i) {
+    const double radius = e.kappa.empty() ? sceneRadius : radiusOf(kernel, e.kappa[i]);
+    Vec3 half = unitHalfWidths(e, i);
+    for (double& h : half) h = radius > 0.0 ? h * radius : 0.0;
+    expand(box, centerOf(chunk, i), half);
+  }
+  return box;
+}
+
+Box centerBox(const Chunk& chunk, Run run) {
+  Box box;
+  for (std::size_t i = run.first; i < run.first + run.count; ++i)
+    expand(box, centerOf(chunk, i), {});
+  return box;
+}
+
+// ---- The lattice
+
+namespace {
+
+constexpr int kMaxOffset = 1 << 20;  // limit on offsets of bits, for sums in 32 bits
+constexpr int kMaxSlope = 1 << 12;
+
+int getWithin(ByteReader& in, int limit, const char* what) {
+  const auto n = in.get<std::int32_t>();
+  if (n < -limit || n > limit) in.fail(std::string(what) + " of the lattice is out of range");
+  return n;
+}
+
+double getStep(ByteReader& in, const char* what) {
+  const auto step = in.get<double>();
+  if (!(std::isfinite(step) && step > 0.0))
+    in.fail(std::string(what) + " of the lattice is not a positive number");
+  return step;
+}
+
+}  // namespace
+
+void putLattice(ByteWriter& out, const Lattice& l) {
+  out.put(l.cell);
+  for (const auto low : {l.lowestCell.x, l.lowestCell.y, l.lowestCell.z}) out.put(low);
+  out.put(l.scaleStep);
+  out.put(l.lowestScale);
+  out.put(l.intensityStep);
+  for (const int n : {l.positionBase, l.positionSlope, l.scaleOffset, l.intensityBase,
+                      l.intensitySlope, l.rotationOffset})
+    out.put(std::int32_t(n));
+  out.put(std::uint8_t(l.cellBits));
+  out.put(std::uint8_t(l.signedIntensity));
+  out.put(std::uint8_t(l.rotationFrom.size()));
+  out.putAll(l.rotationFrom);
+}
+
+Lattice getLattice(ByteReader& in) {
+  Lattice l;
+  l.cell = getStep(in, "the cell");
+  l.lowestCell.x = in.get<std::int32_t>();
+  l.lowestCell.y = in.get<std::int32_t>();
+  l.lowestCell.z = in.get<std::int32_t>();
+  l.scaleStep = getStep(in, "the step of scales");
+  l.lowestScale = in.get<std::int32_t>();
+  l.intensityStep = getStep(in, "the step of intensities");
+  l.positionBase = getWithin(in, kMaxOffset, "the base of positions");
+  l.positionSlope = getWithin(in, kMaxSlope, "the slope of positions");
+  l.scaleOffset = getWithin(in, kMaxOffset, "the offset of scales");
+  l.intensityBase = getWithin(in, kMaxOffset, "the base of intensities");
+  l.intensitySlope = getWithin(in, kMaxSlope, "the slope of intensities");
+  l.rotationOffset = getWithin(in, kMaxOffset, "the offset of rotations");
+  l.cellBits = in.get<std::uint8_t>();
+  if (l.cellBits > Lattice::kMaxCellBits) in.fail("the lattice has too many cells");
+  l.signedIntensity = in.getEnum(std::uint8_t{1}, "mark of signs") != 0;
+  l.rotationFrom.resize(in.get<std::uint8_t>());
+  for (auto& from : l.rotationFrom) from = in.get<std::uint8_t>();
+  return l;
+}
+
+// ---- Blocks
+
 namespace {
 
 constexpr std::size_t kContexts = 8;
@@ -213,4 +353,58 @@ void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q) {
   BlockCoder<codec::Reader>(readers, q).code(run);
 }
 
-}  // namespace esvr::format
+}  // namespace format
+
+// ---- Bytes of layers and streams
+
+namespace {
+
+std::size_t layersOf(const QuantisedEllipsoids& q) {
+  return q.layerEnds.empty() ? std::min<std::size_t>(q.size(), 1) : q.layerEnds.size();
+}
+
+std::uint64_t bytesOf(const format::BlockStreams& block) {
+  return std::accumulate(block.begin(), block.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const auto& s) { return sum + s.size(); });
+}
+
+void addLayers(const QuantisedEllipsoids& q, std::vector<LayerSize>& sizes) {
+  const auto runs = format::blockRuns(q);
+  const auto blocks = format::encodeBlocks(q);
+  std::size_t layer = 0;
+  for (std::size_t b = 0; b < runs.size(); ++b) {
+    if (!q.layerEnds.empty() && runs[b].first == q.layerEnds[layer]) ++layer;
+    sizes[layer].ellipsoids += runs[b].count;
+    sizes[layer].bytes += bytesOf(blocks[b]);
+  }
+}
+
+}  // namespace
+
+std::size_t layerCount(const StoredGrid& grid) {
+  if (grid.quantised.empty()) return std::min<std::size_t>(grid.field.ellipsoidCount(), 1);
+  std::size_t layers = 0;
+  for (const auto& chunk : grid.quantised) layers = std::max(layers, layersOf(chunk));
+  return layers;
+}
+
+std::vector<LayerSize> layerSizes(const StoredGrid& grid) {
+  std::vector<LayerSize> sizes(grid.quantised.empty() ? 0 : layerCount(grid));
+  for (const auto& chunk : grid.quantised) addLayers(chunk, sizes);
+  return sizes;
+}
+
+StreamBytes streamBytes(const StoredGrid& grid) {
+  StreamBytes bytes;
+  for (const auto& chunk : grid.quantised) {
+    for (const auto& block : format::encodeBlocks(chunk)) {
+      bytes.positions += block[0].size();
+      bytes.scales += block[1].size();
+      bytes.rotations += block[2].size();
+      bytes.intensities += block[3].size();
+    }
+  }
+  return bytes;
+}
+
+}  // namespace esvr

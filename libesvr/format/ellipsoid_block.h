@@ -1,5 +1,6 @@
 #pragma once
-/// One block of quantised ellipsoids as four streams of the range coder.
+/// Parts of the sections of ellipsoids: the boxes by which a reader decides what it needs, the quantisation lattice, and
+/// blocks of quantised ellipsoids as four streams of the range coder.
 
 #include <array>
 #include <cstddef>
@@ -7,12 +8,38 @@
 #include <span>
 #include <vector>
 
+#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
 #include "esvr/quantised.h"
-#include "format/byte_reader.h"
-#include "format/byte_writer.h"
-#include "format/chunk_box.h"
+#include "format/bytes.h"
 
 namespace esvr::format {
+
+// ---- Boxes
+
+/// Consecutive ellipsoids of a chunk.
+struct Run {
+  std::size_t first = 0, count = 0;
+};
+
+[[nodiscard]] inline Run all(const Chunk& chunk) { return {0, chunk.ellipsoids.size()}; }
+
+/// Smallest integer box, in index coordinates, that contains the supports of a run's ellipsoids. It
+/// is limited to 32-bit coordinates. Empty without ellipsoids.
+[[nodiscard]] Box supportBox(const Chunk& chunk, Run run, const Kernel& kernel);
+
+/// Smallest integer box that contains the centers of a run's ellipsoids. It lies in the support box
+/// and is the same on every machine, so that a reader can check the stored box against it.
+[[nodiscard]] Box centerBox(const Chunk& chunk, Run run);
+
+// ---- The lattice
+
+void putLattice(ByteWriter& out, const Lattice& lattice);
+
+/// \throws BadInput  a step is not positive, or a number of bits is out of range
+[[nodiscard]] Lattice getLattice(ByteReader& in);
+
+// ---- Blocks
 
 /// Blocks are decoded one without the other. Those of layers are smaller, so that a box needs fewer
 /// ellipsoids; each block has to learn its models anew, which costs bytes (docs/lab-notes.md,

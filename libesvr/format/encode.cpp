@@ -1,33 +1,74 @@
+// Writing a container: the checks of a grid, the order of its ellipsoids, and the sections of a file or of a frame.
+
 #include "format/encode.h"
 
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <utility>
 
+#include "codec/brick_coder.h"
 #include "core/atomic_file.h"
 #include "esvr/container.h"
 #include "esvr/grid_names.h"
-#include "format/bricks_stream.h"
-#include "format/byte_writer.h"
-#include "format/carried_record.h"
-#include "format/chunk_box.h"
-#include "format/curve_stream.h"
-#include "format/ellipsoids_section.h"
-#include "format/grid_record.h"
-#include "format/grid_records.h"
-#include "format/layer_errors_stream.h"
-#include "format/layered_section.h"
-#include "format/level_section.h"
-#include "format/mask_section.h"
-#include "format/morton_order.h"
-#include "format/planes.h"
-#include "format/predicted_grid.h"
-#include "format/related_voxels.h"
-#include "format/section_writer.h"
-#include "format/validity.h"
+#include "format/activity_sections.h"
+#include "format/ellipsoid_sections.h"
+#include "format/predicted_sections.h"
+#include "format/records.h"
 
 namespace esvr {
+
+// ---- The order of ellipsoids
+
+namespace format {
+namespace {
+
+constexpr int kBitsPerAxis = 21;  // three of these make a 64-bit key
+constexpr double kCellsPerVoxel = 256.0;
+constexpr double kLastCell = double((1u << kBitsPerAxis) - 1);  // at 8192 voxels
+
+/// Adds one coordinate to the keys of all ellipsoids. Cells are counted from the lowest center.
+void addAxis(const std::vector<float>& center, int axis, std::vector<std::uint64_t>& keys) {
+  if (center.empty()) return;
+  const double low = *std::min_element(center.begin(), center.end());
+  for (std::size_t i = 0; i < center.size(); ++i) {
+    const double cell = std::min((center[i] - low) * kCellsPerVoxel, kLastCell);
+    keys[i] |= spreadBits(std::uint64_t(cell)) << axis;
+  }
+}
+
+std::vector<float> picked(const std::vector<float>& values, const std::vector<std::size_t>& order) {
+  std::vector<float> result;
+  if (values.empty()) return result;
+  result.reserve(order.size());
+  for (const auto i : order) result.push_back(values[i]);
+  return result;
+}
+
+}  // namespace
+
+Ellipsoids inMortonOrder(const Ellipsoids& e) {
+  std::vector<std::uint64_t> keys(e.size());
+  for (int axis = 0; axis < 3; ++axis) addAxis(e.center[std::size_t(axis)], axis, keys);
+  std::vector<std::size_t> order(e.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return keys[a] < keys[b]; });
+
+  Ellipsoids sorted;
+  for (std::size_t c = 0; c < 3; ++c) sorted.center[c] = picked(e.center[c], order);
+  for (std::size_t c = 0; c < 3; ++c) sorted.logScale[c] = picked(e.logScale[c], order);
+  for (std::size_t c = 0; c < 4; ++c) sorted.rotation[c] = picked(e.rotation[c], order);
+  sorted.intensity = picked(e.intensity, order);
+  sorted.kappa = picked(e.kappa, order);
+  return sorted;
+}
+
+}  // namespace format
+
+// ---- Sections of a file
+
 namespace {
 
 using namespace format;

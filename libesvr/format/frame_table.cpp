@@ -1,16 +1,17 @@
+// The short form of a table, of frames and of packed sections.
+
 #include "format/frame_table.h"
 
 #include <algorithm>
-#include <string>
+#include <utility>
 
-#include "format/checksum.h"
-#include "format/table_check.h"
-#include "format/varint.h"
+#include "esvr/error.h"
 
 namespace esvr::format {
+
 namespace {
 
-constexpr std::uint8_t kMetadata = 1, kVectors = 2, kCarried = 4, kAll = 7;
+constexpr std::uint8_t kMetadata = 1, kVectors = 2, kCarried = 4, kAllParts = 7;
 constexpr std::uint16_t kMinorVersion = 3;
 constexpr std::size_t kFrameSumBytes = sizeof(std::uint64_t);
 
@@ -21,7 +22,7 @@ std::uint8_t bitsOf(const Inherited& inherited) {
 
 Inherited getInherited(ByteReader& in) {
   const auto bits = in.get<std::uint8_t>();
-  if (bits > kAll) in.fail("unknown parts of the frame before: " + std::to_string(bits));
+  if (bits > kAllParts) in.fail("unknown parts of the frame before: " + std::to_string(bits));
   return {(bits & kMetadata) != 0, (bits & kVectors) != 0, (bits & kCarried) != 0};
 }
 
@@ -145,6 +146,41 @@ FrameTable getFrame(std::span<const std::byte> bytes, const std::string& name) {
   if (checksum(bytes.first(bytes.size() - kFrameSumBytes)) != end.get<std::uint64_t>())
     throw BadInput(name + ": the checksum of the frame does not match");
   return FrameReader(bytes, name).read();
+}
+
+// ---- Packed sections
+
+namespace {
+
+/// The rows in the content of a packed section. Their offsets are those in the file.
+std::vector<SectionEntry> rowsIn(const ByteSource& source, const SectionTable& table,
+                                 std::size_t packed) {
+  const std::string place = placeOf(source.name(), table, packed);
+  const SectionEntry& entry = table.entries[packed];
+  if (entry.codec != Codec::kRaw) throw BadInput(place + ": must not be compressed");
+  FrameTable content = getFrame(readStored(source, table, packed), place);
+  if (content.inherited != Inherited{}) throw BadInput(place + ": refers to another frame");
+  for (SectionEntry& row : content.sections.entries) row.offset += entry.offset;
+  return std::move(content.sections.entries);
+}
+
+}  // namespace
+
+void addPackedRows(const ByteSource& source, SectionTable& table) {
+  const auto isPacked = [](const SectionEntry& entry) {
+    return entry.id == SectionId{SectionKind::kPacked};
+  };
+  const auto packed = std::ranges::find_if(table.entries, isPacked);
+  if (packed == table.entries.end()) return;
+  const auto rows = rowsIn(source, table, std::size_t(packed - table.entries.begin()));
+  table.entries.insert(table.entries.end(), rows.begin(), rows.end());
+  checkRows(source.name(), table);
+}
+
+SectionTable readAllRows(const ByteSource& source) {
+  SectionTable table = readTable(source);
+  addPackedRows(source, table);
+  return table;
 }
 
 }  // namespace esvr::format

@@ -1,13 +1,14 @@
 #pragma once
-/// The short form of a frame that refers to the previous one (docs/format.md, "Frames"). It has the
-/// sections of a file, but a table of a few bytes for each of them, and one checksum.
+/// The short form of a table, which has a few bytes for each section, and one checksum for all of them. A frame that
+/// refers to the previous one has it (docs/format.md, "Frames"), and so has the section that holds the small sections
+/// of a file, which then need no rows of the section table ("Packed sections").
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "format/byte_source.h"
 #include "format/section_table.h"
 
 namespace esvr::format {
@@ -49,5 +50,19 @@ struct FrameContents {
 /// \param name  start of error texts
 /// \throws BadInput
 [[nodiscard]] FrameTable getFrame(std::span<const std::byte> bytes, const std::string& name);
+
+// ---- Packed sections
+
+/// Largest number of bytes of a section that is packed.
+inline constexpr std::uint64_t kLargestPacked = 4096;
+
+/// Adds the rows of packed sections to a table, if the file has any. The section that holds them is
+/// read and verified.
+/// \throws BadInput  it is damaged
+void addPackedRows(const ByteSource& source, SectionTable& table);
+
+/// The header and the section table of a file, and the rows of packed sections after its own.
+/// \throws BadInput  as for readTable
+[[nodiscard]] SectionTable readAllRows(const ByteSource& source);
 
 }  // namespace esvr::format

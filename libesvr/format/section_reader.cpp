@@ -5,9 +5,7 @@
 
 #include "esvr/error.h"
 #include "format/carried_bytes.h"
-#include "format/packed_sections.h"
-#include "format/sequence_index.h"
-#include "format/table_check.h"
+#include "format/frame_table.h"
 
 namespace esvr::format {
 

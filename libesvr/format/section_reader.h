@@ -8,7 +8,7 @@
 
 #include "core/memory_budget.h"
 #include "esvr/container.h"
-#include "format/byte_source.h"
+#include "format/bytes.h"
 #include "format/section_table.h"
 
 namespace esvr::format {

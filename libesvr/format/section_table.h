@@ -1,6 +1,9 @@
 #pragma once
-/// The header and the section table, which say where everything is in the file.
+/// Where everything is in a file: the numbers that docs/format.md specifies, the header, the section table and its
+/// checks, and the codecs in which sections are stored. The bytes of carried grids have a codec of their own
+/// (carried_bytes.h).
 
+#include <array>
 #include <compare>
 #include <cstddef>
 #include <cstdint>
@@ -9,10 +12,82 @@
 #include <string>
 #include <vector>
 
-#include "format/byte_source.h"
-#include "format/layout.h"
+#include "esvr/container.h"
+#include "format/bytes.h"
 
 namespace esvr::format {
+
+// ---- The numbers of the format
+
+/// The first byte is not text, and CR LF LF changes under every conversion of line ends: CR LF to
+/// LF, LF to CR LF, and LF to CR.
+inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
+
+inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
+inline constexpr std::uint16_t kVersionMinor = 5;
+
+inline constexpr std::uint64_t kHeaderBytes = 48;
+inline constexpr std::uint64_t kHeaderChecksumAt = 40;
+inline constexpr std::uint64_t kEntryBytes = kSectionRowBytes;
+inline constexpr std::uint64_t kAlignment = 8;  ///< positions of table and sections
+
+/// The grid or the chunk of a section that belongs to the whole file or to a whole grid.
+inline constexpr std::uint32_t kNone = 0xffffffff;
+
+enum class SectionKind : std::uint32_t {
+  kFileMetadata = 1,
+  kGrid = 2,
+  kChunks = 3,
+  kBricks = 4,
+  kLayerErrors = 6,
+  kCurve = 7,
+  kCarried = 8,
+  kVector = 9,
+  kGridRecords = 11,
+  kPacked = 12,
+  kCenters = 16,
+  kScales = 17,
+  kRotations = 18,
+  kIntensities = 19,
+  kKappas = 20,
+  kEllipsoids = 32,
+  kLayered = 34,
+  kMask = 35,
+  kVoxels = 36,
+  kResidual = 37,
+  kCarriedBytes = 38,
+  kPredicted = 39,
+  kRelated = 41,
+  kLevels = 43,
+  kSequenceIndex = 64,
+};
+
+enum class Codec : std::uint16_t {
+  kRaw = 0,
+  kBytes = 1,
+  kFloats = 2,
+  kBlosc = 3,  ///< Only carried bytes have this codec.
+};
+
+/// Flags of a section.
+inline constexpr std::uint16_t kRequired = 1;  ///< readers that do not know the kind refuse
+
+/// Sizes of records.
+inline constexpr std::uint64_t kChunkRecordBytes = 44;
+
+/// The name of a kind, for example "centers" or "unknown 0x2a".
+[[nodiscard]] std::string nameOf(SectionKind kind);
+[[nodiscard]] std::string nameOf(Codec codec);
+[[nodiscard]] bool known(SectionKind kind);
+/// The first minor version of the format that has a kind.
+[[nodiscard]] std::uint16_t minorVersionOf(SectionKind kind);
+[[nodiscard]] bool known(Codec codec);
+
+constexpr std::uint64_t alignUp(std::uint64_t offset) {
+  return (offset + kAlignment - 1) / kAlignment * kAlignment;
+}
+
+// ---- The table
 
 /// Identifies a section. It is unique in a file.
 struct SectionId {
@@ -50,6 +125,9 @@ struct SectionTable {
   bool isFrame = false;  ///< the table is that of a frame in the short form (frame_table.h)
 };
 
+/// True if the table is that of a sequence, whose index is one of its sections.
+[[nodiscard]] bool isSequence(const SectionTable& table);
+
 /// A name for error texts, for example "centers of grid 0, chunk 2".
 [[nodiscard]] std::string describe(const SectionId& id);
 
@@ -68,6 +146,43 @@ struct SectionTable {
 /// possible. It reads no section.
 /// \throws BadInput
 [[nodiscard]] SectionTable readTable(const ByteSource& source);
+
+/// Refuses sections that reach beyond the file, sections that overlap but are not stored alike, two
+/// sections with the same id, unknown kinds that are required, unknown codecs, and impossible
+/// sizes.
+/// \throws BadInput
+void checkTable(const std::string& file, const SectionTable& table);
+
+/// Refuses what checkTable() refuses besides the places of the sections. \throws BadInput
+void checkRows(const std::string& file, const SectionTable& table);
+
+/// Refuses bytes that belong to no section and are not zero. \throws BadInput
+void checkGaps(const ByteSource& source, const SectionTable& table);
+
+// ---- Codecs (docs/format.md, "Codecs")
+
+/// The content of a section as it is stored in the file.
+struct Packed {
+  Codec codec = Codec::kRaw;
+  std::vector<std::byte> bytes;
+  std::uint64_t rawBytes = 0;
+};
+
+/// Compresses content if that saves enough bytes. The same content gives the same bytes.
+[[nodiscard]] Packed pack(std::vector<std::byte> raw);
+/// The same for content that consists of f32.
+[[nodiscard]] Packed packFloats(std::vector<std::byte> raw);
+
+/// True if a codec can make `rawBytes` from `storedBytes`. A reader calls this before it allocates
+/// memory.
+[[nodiscard]] bool plausibleSizes(Codec codec, std::uint64_t storedBytes, std::uint64_t rawBytes);
+
+/// Decompresses content. The sizes must be plausible. Content that is damaged becomes other content.
+/// \throws BadInput  the codec is that of carried grids; the text begins with `where`
+[[nodiscard]] std::vector<std::byte> unpack(Codec codec, std::vector<std::byte> stored,
+                                            std::uint64_t rawBytes, const std::string& where);
+
+// ---- Reading sections
 
 /// Passes the stored bytes of a section on in pieces, so that they need not be in memory.
 void forEachPiece(const ByteSource& source, const SectionEntry& entry,

@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <bit>
 
-#include "format/byte_writer.h"
+#include "format/bytes.h"
 #include "format/carried_bytes.h"
-#include "format/checksum.h"
-#include "format/packed_sections.h"
+#include "format/frame_table.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {

@@ -11,7 +11,6 @@
 #include "esvr/container.h"
 #include "esvr/voxel_layer.h"
 #include "esvr/voxel_memory.h"
-#include "format/codec.h"
 #include "format/frame_table.h"
 #include "format/section_table.h"
 
@@ -36,7 +35,7 @@ class SectionWriter {
   /// Adds a section of the bytes of a carried grid, which may be too large for the heap.
   void addCarried(const SectionId& id, const VoxelArray<std::byte>& content);
 
-  /// kCompact: small sections are packed (packed_sections.h) if that makes the file smaller.
+  /// kCompact: small sections are packed (frame_table.h) if that makes the file smaller.
   void setLayout(FileLayout layout) { layout_ = layout; }
   [[nodiscard]] FileLayout layout() const { return layout_; }
 

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "codec/brick_order.h"
-#include "codec/cell_tree.h"
+#include "codec/brick_coder.h"
 #include "codec/voxel_coder.h"
 #include "esvr/error.h"
 

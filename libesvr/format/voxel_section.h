@@ -8,8 +8,7 @@
 
 #include "core/memory_budget.h"
 #include "esvr/voxel_layer.h"
-#include "format/byte_reader.h"
-#include "format/byte_writer.h"
+#include "format/bytes.h"
 
 namespace esvr::format {
 

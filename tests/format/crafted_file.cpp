@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "format/checksum.h"
-#include "format/codec.h"
+#include "format/bytes.h"
+#include "format/section_table.h"
 
 namespace esvr::test {
 

@@ -1,6 +1,10 @@
 // Plan: whatever happens to the bytes of a file by accident, it is refused or its content is that
 // of the original. Checksums cover every byte that need not be zero, so damage is found unless
 // 64-bit hashes collide.
+//
+// Each byte of a small sequence is damaged, and the file is cut at each byte. The check must
+// find every damage, and a reader must lose no frame but the damaged one and those that refer to
+// it.
 
 #include <gtest/gtest.h>
 
@@ -9,7 +13,9 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/sequence_file.h"
 #include "format/sample_files.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
@@ -104,6 +110,103 @@ TEST(Damage, TenThousandMutationsAreRefusedOrChangeNothing) {
     }
   }
   EXPECT_LT(accepted, 500);  // mutations that changed nothing
+}
+
+// ---- Sequences
+
+using test::bytesIn;
+using test::sampleFrame;
+
+class SequenceDamage : public testing::Test {
+ protected:
+  SequenceDamage() {
+    test::writeChains(path(), {{1, 2, 3}, {5, 6}});
+    whole_ = bytesIn(path());
+    frames_ = SequenceReader(path()).frames();
+  }
+  [[nodiscard]] std::filesystem::path path() const { return folder_ / "a.esvr"; }
+  void damage(std::size_t at) const {
+    Bytes bytes = whole_;
+    bytes[at] ^= std::byte{0x10};
+    test::writeBytes(path(), bytes);
+  }
+  /// The index of the frame that has a byte; the number of frames if none has it.
+  [[nodiscard]] std::size_t frameAt(std::size_t at) const {
+    const auto has = [&](const SequenceFrame& f) {
+      return at >= f.offset && at < f.offset + f.bytes;
+    };
+    return std::size_t(std::ranges::find_if(frames_, has) - frames_.begin());
+  }
+  /// True if a frame cannot be read when the damaged frame is lost.
+  [[nodiscard]] bool isLost(std::size_t frame, std::size_t damaged) const {
+    return damaged < frames_.size() && frame >= damaged &&
+           frames_[frame].group == frames_[damaged].group;
+  }
+  static bool canRead(SequenceReader& reader, std::int64_t number) try {
+    return test::difference(reader.read(number), sampleFrame(number)).empty();
+  } catch (const BadInput&) {
+    return false;
+  }
+
+  test::TemporaryFolder folder_;
+  Bytes whole_;
+  std::vector<SequenceFrame> frames_;
+};
+
+/// True if the check finds a fault or refuses the file.
+bool isFound(const std::filesystem::path& path) try {
+  return !checkSequence(path).empty();
+} catch (const BadInput&) {
+  return true;
+}
+
+TEST_F(SequenceDamage, IsFoundInEveryByte) {
+  EXPECT_FALSE(isFound(path()));
+  for (std::size_t at = 0; at < whole_.size(); ++at) {
+    damage(at);
+    EXPECT_TRUE(isFound(path())) << at;
+  }
+}
+
+TEST_F(SequenceDamage, LosesNoOtherFrames) {
+  const std::size_t end = frames_.back().offset + frames_.back().bytes;
+  for (std::size_t at = frames_.front().offset; at < end; at += 3) {
+    damage(at);
+    SequenceReader reader(path());
+    for (std::size_t i = 0; i < frames_.size(); ++i)
+      EXPECT_EQ(canRead(reader, frames_[i].number), !isLost(i, frameAt(at)))
+          << "byte " << at << ", frame " << frames_[i].number;
+  }
+}
+
+TEST_F(SequenceDamage, IsToldForEachFrameThatIsLost) {
+  damage(frames_[1].offset + 1);
+  std::vector<std::optional<std::int64_t>> lost;
+  for (const SequenceFault& fault : checkSequence(path())) lost.push_back(fault.frame);
+  EXPECT_EQ(lost, (std::vector<std::optional<std::int64_t>>{2, 3}));
+}
+
+TEST_F(SequenceDamage, IsTruncationAtAnyByte) {
+  for (std::size_t n = 0; n < whole_.size(); ++n) {
+    test::writeBytes(path(), {whole_.begin(), whole_.begin() + std::ptrdiff_t(n)});
+    EXPECT_THROW(SequenceReader{path()}, BadInput) << n;
+  }
+}
+
+TEST_F(SequenceDamage, OfAPartialFileRemovesTheGroupAndThoseAfterIt) {
+  std::filesystem::rename(path(), folder_ / "b.esvr");
+  {
+    SequenceWriter writer(path());
+    for (const std::int64_t number : {1, 2}) {
+      writer.append(number, encodeEsvr(sampleFrame(number)));
+      writer.endGroup();
+    }
+  }
+  Bytes bytes = bytesIn(SequenceWriter::partialPath(path()));
+  bytes[bytes.size() / 4] ^= std::byte{1};
+  test::writeBytes(SequenceWriter::partialPath(path()), bytes);
+  const SequenceWriter writer(path(), {.partial = PartialSequence::kResume});
+  EXPECT_EQ(writer.groupCount(), 0u);
 }
 
 }  // namespace

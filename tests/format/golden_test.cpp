@@ -9,7 +9,6 @@
 #include <iterator>
 
 #include "esvr/container.h"
-#include "format/golden_files.h"
 #include "format/sample_files.h"
 
 namespace esvr {

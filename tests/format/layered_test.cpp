@@ -16,7 +16,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/level_of_detail.h"
 #include "format/allocation_meter.h"
-#include "format/checksum.h"
+#include "format/bytes.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
 #include "support/temporary_folder.h"

@@ -5,8 +5,7 @@
 #include <fstream>
 #include <iostream>
 
-#include "format/golden_files.h"
-#include "format/sequence_samples.h"
+#include "format/sample_files.h"
 
 int main(int argc, char** argv) {
   if (argc != 3) {

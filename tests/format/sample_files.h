@@ -1,9 +1,10 @@
 #pragma once
-/// Small deterministic files to encode, which are made without a fit, and their comparison bit by
-/// bit.
+/// Small deterministic files to encode, which are made without a fit, and their comparison bit by bit; the content of
+/// the golden files; and small files of sequences.
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,5 +56,40 @@ struct EllipsoidParts {
 /// Compares all members, floating-point numbers bit by bit. \return the name of the first that
 /// differs, or ""
 [[nodiscard]] std::string difference(const EsvrFile& a, const EsvrFile& b);
+
+// ---- The content of the files in tests/format/golden, and how this version of the format writes them
+
+struct GoldenFile {
+  std::string name;
+  EsvrFile content;
+  bool unknownSection = false;  ///< an optional section of an unknown kind follows
+};
+
+[[nodiscard]] std::vector<GoldenFile> goldenFiles();
+
+/// The file as this library writes it.
+[[nodiscard]] std::vector<std::byte> bytesOf(const GoldenFile& golden);
+
+// ---- Sequences
+
+/// A frame with a grid of voxels and ellipsoids that depends on the number. Frames whose number is
+/// a multiple of 5 have no grids.
+[[nodiscard]] EsvrFile sampleFrame(std::int64_t number);
+
+/// Writes groups of frames, which refer to no other frame.
+void writeSequence(const std::filesystem::path& path,
+                   const std::vector<std::vector<std::int64_t>>& groups);
+
+/// The same, but all frames except the first ones of groups say that they refer to the frame before
+/// them. Their bytes do not need it.
+void writeChains(const std::filesystem::path& path,
+                 const std::vector<std::vector<std::int64_t>>& groups);
+
+/// Writes the golden sequence: the frames -2 and 1 in one group, and frame 3 in another one. They
+/// are the golden files one_ellipsoid, no_grid and voxels.
+void writeGoldenSequence(const std::filesystem::path& path);
+
+[[nodiscard]] std::vector<std::byte> bytesIn(const std::filesystem::path& path);
+void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
 
 }  // namespace esvr::test

@@ -17,14 +17,12 @@
 #include "esvr/error.h"
 #include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
-#include "format/byte_writer.h"
-#include "format/checksum.h"
+#include "format/bytes.h"
 #include "format/crafted_file.h"
 #include "format/frame_table.h"
-#include "format/related_voxels.h"
+#include "format/predicted_sections.h"
 #include "format/sample_files.h"
 #include "format/section_writer.h"
-#include "format/varint.h"
 #include "support/temporary_folder.h"
 
 namespace esvr {

@@ -1,0 +1,239 @@
+// The voxels of a stored grid: the rule by which they follow from the sum of ellipsoids, how much work that is, and the
+// decoding of grids of numbers and of vectors.
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "esvr/error.h"
+#include "esvr/field.h"
+#include "esvr/grid_coding.h"
+#include "esvr/grid_names.h"
+#include "field/active_region.h"
+#include "format/grid_rule.h"
+
+namespace esvr {
+
+// ---- The rule
+
+RevoxeliseOptions voxelRule(const StoredGrid& grid) {
+  RevoxeliseOptions options{.threshold = grid.activeThreshold};
+  const float background = grid.field.background;
+  if (grid.withinRange)  // the range of all values of the source, of active and inactive voxels
+    options.range =
+        ValueRange{std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
+  options.narrowBand =
+      (grid.topology == TopologyKind::kBricks || grid.topology == TopologyKind::kMask) &&
+      grid.descriptor.gridClass == GridClass::kLevelSet && background > 0.0f;
+  options.bricks = grid.bricks;
+  options.restrictToBricks = grid.topology != TopologyKind::kThreshold;
+  options.masks = grid.mask;
+  options.levels = grid.levels;
+  options.box = grid.activeBox;
+  return options;
+}
+
+bool followsFromEllipsoids(const StoredGrid& grid) {
+  return !grid.voxels && !grid.residual && !grid.farBackground;
+}
+
+VoxelRule format::ruleOf(const StoredGrid& grid) {
+  return makeVoxelRule(grid.field.background, voxelRule(grid));
+}
+
+// ---- The work
+
+namespace {
+
+Box boxAround(const std::vector<Coord>& corners) {
+  Box box;
+  for (const Coord corner : corners)
+    box.expand(Box{corner, corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1}});
+  return box;
+}
+
+EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options) {
+  EstimateOptions estimate{.within = common(grid.activeBox, options.box.value_or(Box::whole())),
+                           .enough = double(options.maxBytes),
+                           .memory = options.memory};
+  if (grid.topology == TopologyKind::kThreshold) return estimate;
+  estimate.within = common(estimate.within, boxAround(grid.bricks));
+  estimate.maxBricks = double(grid.bricks.size());
+  return estimate;
+}
+
+}  // namespace
+
+WorkEstimate estimateDecode(const StoredGrid& grid, const DecodeOptions& options) {
+  if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size())};
+  WorkEstimate work = estimateWork(grid.field, optionsFor(grid, options));
+  if (grid.topology != TopologyKind::kThreshold) work.bricks = double(grid.bricks.size());
+  if (grid.residual) work.bricks += double(grid.residual->bricks.size());
+  return work;
+}
+
+// ---- The voxels
+
+namespace {
+
+bool meets(const Box& box, Coord corner) {
+  const Coord last = corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1};
+  return corner.x <= box.max.x && corner.y <= box.max.y && corner.z <= box.max.z &&
+         last.x >= box.min.x && last.y >= box.min.y && last.z >= box.min.z;
+}
+
+/// The place of a decoding: that of the grid's active voxels, or a part of it.
+Box placeOf(const StoredGrid& grid, const DecodeOptions& options) {
+  return options.box ? common(grid.activeBox, *options.box) : grid.activeBox;
+}
+
+/// The grid's rule within the wanted box, and the lists that it refers to.
+struct WantedVoxels {
+  RevoxeliseOptions rule;
+  std::vector<Coord> bricks{};
+  std::vector<BrickMask> masks{};
+  std::vector<BlockLevels> levels{};
+
+  WantedVoxels(const StoredGrid& grid, const DecodeOptions& options) : rule(voxelRule(grid)) {
+    rule.threshold = options.threshold.value_or(rule.threshold);
+    if (options.threshold) rule.masks = {}, rule.levels = {};
+    rule.box = placeOf(grid, options);
+    rule.memory = options.memory;
+    if (rule.restrictToBricks && options.box) takeThose();
+  }
+  WantedVoxels(const WantedVoxels&) = delete;
+  WantedVoxels& operator=(const WantedVoxels&) = delete;
+
+ private:
+  /// Leaves out the bricks outside the box.
+  void takeThose() {
+    for (std::size_t b = 0; b < rule.bricks.size(); ++b) {
+      if (!meets(rule.box, rule.bricks[b])) continue;
+      bricks.push_back(rule.bricks[b]);
+      if (!rule.masks.empty()) masks.push_back(rule.masks[b]);
+      if (!rule.levels.empty()) levels.push_back(rule.levels[b]);
+    }
+    rule.bricks = bricks;
+    rule.masks = masks;
+    rule.levels = levels;
+  }
+};
+
+/// The bricks of the sum that may have an active voxel, and those of the residual, in order.
+std::vector<Coord> withResidualBricks(const StoredGrid& grid, const RevoxeliseOptions& rule) {
+  const VoxelLayer& residual = *grid.residual;
+  if (rule.restrictToBricks) return {rule.bricks.begin(), rule.bricks.end()};
+  std::vector<Coord> own, all;
+  for (const Coord brick : residual.bricks) {
+    const Coord corner = residual.origin + brick * kBrickSide;
+    if (meets(rule.box, corner)) own.push_back(corner);
+  }
+  const auto reached = reachedBricks(grid.field, rule.box);
+  std::set_union(reached.begin(), reached.end(), own.begin(), own.end(), std::back_inserter(all));
+  return all;
+}
+
+/// Adds a residual to the values of the sum, which are clamped to the range of the grid if the grid says so.
+void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
+  for (std::size_t r = 0; r < residual.bricks.size(); ++r) {
+    const Coord corner = residual.origin + residual.bricks[r] * kBrickSide;
+    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    if (!b) continue;
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      float& value = volume.brickValues(*b)[v];
+      const std::int32_t code = residual.codes[r * kBrickVoxels + v];
+      if (code != 0) value = float(double(value) + double(code) / residual.divisor);
+    }
+  }
+}
+
+/// Determines the active voxels of values that are not clamped again, by the rule of revoxelise().
+void activate(VoxelRule rule, const RevoxeliseOptions& options, SparseVolume& volume) {
+  rule.low = -std::numeric_limits<float>::infinity();
+  rule.high = std::numeric_limits<float>::infinity();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    volume.active[b] =
+        settle(rule, regionIn(options, volume.brickCorner(b)), volume.brickValues(b));
+  dropInactiveBricks(volume);
+}
+
+SparseVolume evaluatedWithResidual(const StoredGrid& grid, const RevoxeliseOptions& options) {
+  const auto bricks = withResidualBricks(grid, options);
+  SparseVolume volume = revoxelise(grid.field, {.threshold = format::kAlwaysActive,
+                                                .range = options.range,
+                                                .bricks = bricks,
+                                                .restrictToBricks = true,
+                                                .memory = options.memory});
+  addResidual(*grid.residual, volume);
+  activate(makeVoxelRule(grid.field.background, options), options, volume);
+  return volume;
+}
+
+SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
+  const WantedVoxels wanted(grid, options);
+  return grid.residual ? evaluatedWithResidual(grid, wanted.rule)
+                       : revoxelise(grid.field, wanted.rule);
+}
+
+/// Makes voxels outside a box inactive and drops bricks without an active voxel.
+void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto values = volume.brickValues(b);
+    BrickMask active;
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const bool inside = box.contains(volume.brickCorner(b) + voxelLocal(v));
+      if (!inside) values[v] = rule.inactiveValue(values[v]);
+      if (inside && volume.active[b].test(v)) active.set(v);
+    }
+    volume.active[b] = active;
+  }
+  dropInactiveBricks(volume);
+}
+
+/// True if the decoded values are halfs, as those of the source. Exact voxels are the source's own.
+bool isRoundedToHalfs(const StoredGrid& grid) {
+  return grid.descriptor.valueType == ValueType::kHalf &&
+         (!grid.voxels || grid.voxels->form == VoxelForm::kQuantised);
+}
+
+}  // namespace
+
+SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
+  if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
+    throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
+  if (options.threshold && (grid.voxels || grid.farBackground))
+    throw UsageError("grid '" + shownName(grid.descriptor.name) +
+                     "' says itself which voxels are active: it takes no threshold");
+  if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
+  if (options.maxBytes != kNoMemoryLimit)
+    requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
+                        "grid '" + shownName(grid.descriptor.name) + "'");
+  SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+  if (grid.voxels && options.box) clip(*options.box, format::ruleOf(grid), volume);
+  if (grid.farBackground) setBackground(float(grid.descriptor.background), volume);
+  if (isRoundedToHalfs(grid)) roundToHalfs(volume);
+  return volume;
+}
+
+// ---- Vectors
+
+VectorGrid decodeVector(const std::string& name, StoredComponents components,
+                        const DecodeOptions& options) {
+  VectorGrid vectors;
+  vectors.descriptor = components.front().descriptor;
+  vectors.descriptor.name = name;
+  DecodeOptions left = options;
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    vectors.background[c] = components[c].descriptor.background;
+    vectors.components[c] = decodeGrid(components[c], left);
+    const std::uint64_t bytes = vectors.components[c].values.size() * sizeof(float);
+    if (left.maxBytes != kNoMemoryLimit && !left.memory.isInFile(bytes))
+      left.maxBytes -= std::min(left.maxBytes, bytes);
+  }
+  return vectors;
+}
+
+}  // namespace esvr

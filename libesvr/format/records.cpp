@@ -1,0 +1,506 @@
+// The records of a file as bytes, and their rules.
+
+#include "format/records.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "esvr/error.h"
+
+namespace esvr::format {
+
+namespace {
+
+template <class Enum>
+void putEnum(ByteWriter& out, Enum value) {
+  out.put(static_cast<std::uint8_t>(value));
+}
+
+bool getBool(ByteReader& in, const char* what) {
+  enum class Bool { kFalse, kTrue };
+  return in.getEnum(Bool::kTrue, what) == Bool::kTrue;
+}
+
+void putCoord(ByteWriter& out, Coord c) {
+  for (const auto v : {c.x, c.y, c.z}) out.put(v);
+}
+Coord getCoord(ByteReader& in) {
+  Coord c;
+  for (auto* v : {&c.x, &c.y, &c.z}) *v = in.get<std::int32_t>();
+  return c;
+}
+
+void putBox(ByteWriter& out, const Box& box) {
+  putCoord(out, box.min);
+  putCoord(out, box.max);
+}
+Box getBox(ByteReader& in) {
+  Box box;
+  box.min = getCoord(in);
+  box.max = getCoord(in);
+  return box;
+}
+
+void putTransform(ByteWriter& out, const Transform& transform) {
+  out.putSized(transform.mapType);
+  out.putSized(transform.map);
+  putEnum(out, transform.affine.has_value());
+  if (transform.affine) out.putAll(*transform.affine);
+}
+Transform getTransform(ByteReader& in) {
+  Transform transform;
+  transform.mapType = in.getString();
+  transform.map = in.getBlob();
+  if (!getBool(in, "mark of an affine map")) return transform;
+  transform.affine.emplace();
+  for (double& m : *transform.affine) m = in.get<double>();
+  return transform;
+}
+
+void putDescriptor(ByteWriter& out, const GridDescriptor& d) {
+  out.putSized(d.name);
+  putEnum(out, d.gridClass);
+  putEnum(out, d.valueType);
+  out.put(d.background);
+  putTransform(out, d.transform);
+  putMetadata(out, d.metadata);
+}
+GridDescriptor getDescriptor(ByteReader& in) {
+  GridDescriptor d;
+  d.name = in.getString();
+  d.gridClass = in.getEnum(GridClass::kStaggered, "grid class");
+  d.valueType = in.getEnum(ValueType::kDouble, "value type");
+  d.background = in.get<double>();
+  d.transform = getTransform(in);
+  d.metadata = getMetadata(in);
+  return d;
+}
+
+/// Added to the number of a topology if the grid has StoredGrid::farBackground.
+constexpr std::uint8_t kFarBackground = 4;
+enum class TopologyByte : std::uint8_t {
+  kLast = std::uint8_t(TopologyKind::kBlocks) + kFarBackground
+};
+
+void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
+  out.put(std::uint8_t(std::uint8_t(grid.topology) + (grid.farBackground ? kFarBackground : 0)));
+  putEnum(out, grid.withinRange);
+  out.put(grid.activeThreshold);
+  putBox(out, grid.activeBox);
+  out.put(grid.activeVoxels);
+  out.put(grid.valueMin);
+  out.put(grid.valueMax);
+}
+void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
+  const auto topology = std::uint8_t(in.getEnum(TopologyByte::kLast, "topology"));
+  grid.topology = TopologyKind(topology % kFarBackground);
+  grid.farBackground = topology >= kFarBackground;
+  grid.withinRange = getBool(in, "mark of a range of values");
+  grid.activeThreshold = in.get<float>();
+  grid.activeBox = getBox(in);
+  grid.activeVoxels = in.get<std::uint64_t>();
+  grid.valueMin = in.get<float>();
+  grid.valueMax = in.get<float>();
+}
+
+void putKernel(ByteWriter& out, const Kernel& kernel) {
+  putEnum(out, kernel.form);
+  out.put(kernel.kappa);
+  out.put(kernel.epsilon);
+}
+Kernel getKernel(ByteReader& in) {
+  Kernel kernel;
+  kernel.form = in.getEnum(KernelForm::kPaper, "kernel");
+  kernel.kappa = in.get<float>();
+  kernel.epsilon = in.get<float>();
+  return kernel;
+}
+
+}  // namespace
+
+void putMetadata(ByteWriter& out, const std::vector<MetaItem>& items) {
+  out.put(std::uint32_t(items.size()));
+  for (const auto& item : items) {
+    out.putSized(item.name);
+    out.putSized(item.type);
+    out.putSized(item.value);
+  }
+}
+
+std::vector<MetaItem> getMetadata(ByteReader& in) {
+  std::vector<MetaItem> items;
+  // Memory is not reserved for the stored count, because the count is checked only by reading the
+  // items.
+  for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
+    auto& item = items.emplace_back();
+    item.name = in.getString();
+    item.type = in.getString();
+    item.value = in.getBlob();
+  }
+  return items;
+}
+
+void putChunk(ByteWriter& out, const ChunkRecord& chunk) {
+  putCoord(out, chunk.origin);
+  putBox(out, chunk.box);
+  out.put(chunk.count);
+}
+
+ChunkRecord getChunk(ByteReader& in) {
+  ChunkRecord chunk;
+  chunk.origin = getCoord(in);
+  chunk.box = getBox(in);
+  chunk.count = in.get<std::uint64_t>();
+  return chunk;
+}
+
+void putGrid(ByteWriter& out, const StoredGrid& grid, const std::vector<ChunkRecord>& chunks) {
+  putDescriptor(out, grid.descriptor);
+  putVoxelFacts(out, grid);
+  out.put(grid.field.background);
+  putKernel(out, grid.field.kernel);
+  out.put(std::uint32_t(chunks.size()));
+  if (chunks.size() == 1) putChunk(out, chunks.front());
+}
+
+GridRecord getGrid(ByteReader& in) {
+  GridRecord record;
+  record.grid.descriptor = getDescriptor(in);
+  getVoxelFacts(in, record.grid);
+  record.grid.field.background = in.get<float>();
+  record.grid.field.kernel = getKernel(in);
+  record.chunkCount = in.get<std::uint32_t>();
+  if (record.chunkCount == 1) record.chunks.push_back(getChunk(in));
+  return record;
+}
+
+// ---- Differences of records
+
+namespace {
+
+std::vector<std::byte> recordOf(const StoredGrid& grid) {
+  ByteWriter record;
+  putGrid(record, grid, {});
+  return record.take();
+}
+
+std::uint32_t equalBytes(std::span<const std::byte> a, std::span<const std::byte> b) {
+  const auto end = std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first;
+  return std::uint32_t(end - a.begin());
+}
+
+std::uint32_t equalBytesAtEnd(std::span<const std::byte> a, std::span<const std::byte> b) {
+  const auto end = std::mismatch(a.rbegin(), a.rend(), b.rbegin(), b.rend()).first;
+  return std::uint32_t(end - a.rbegin());
+}
+
+/// Writes the bytes of a record between those that the previous record begins and ends with too.
+void putRecord(ByteWriter& out, std::span<const std::byte> record,
+               std::span<const std::byte> previous) {
+  const std::uint32_t first = equalBytes(record, previous);
+  const std::uint32_t last = equalBytesAtEnd(record.subspan(first), previous.subspan(first));
+  out.put(first);
+  out.put(last);
+  out.putSized(record.subspan(first, record.size() - first - last));
+}
+
+std::vector<std::byte> getRecord(ByteReader& in, std::span<const std::byte> previous) {
+  const auto first = in.get<std::uint32_t>(), last = in.get<std::uint32_t>();
+  if (std::uint64_t(first) + last > previous.size())
+    in.fail("more bytes of the previous frame's record than it has");
+  const auto middle = in.getSized();
+  std::vector<std::byte> record(previous.begin(), previous.begin() + first);
+  record.insert(record.end(), middle.begin(), middle.end());
+  record.insert(record.end(), previous.end() - last, previous.end());
+  return record;
+}
+
+StoredGrid gridOf(std::span<const std::byte> record, const std::string& where) {
+  ByteReader in(record, where);
+  GridRecord grid = getGrid(in);
+  in.finish();
+  if (grid.chunkCount != 0) in.fail("the record has chunks");
+  return std::move(grid.grid);
+}
+
+}  // namespace
+
+void putRecordAfter(ByteWriter& out, const StoredGrid& grid, const StoredGrid& previous) {
+  putRecord(out, recordOf(grid), recordOf(previous));
+}
+
+StoredGrid getRecordAfter(ByteReader& in, const StoredGrid& previous, const std::string& where) {
+  return gridOf(getRecord(in, recordOf(previous)), where);
+}
+
+// ---- Carried grids
+
+void putCarried(ByteWriter& out, const CarriedGrid& grid) {
+  out.putSized(grid.name);
+  out.putSized(grid.treeType);
+  out.put(std::uint8_t(grid.savedAsHalf));
+  out.put(grid.vdbVersion);
+  out.put(grid.place);
+  out.put(grid.blocksAt);
+}
+
+CarriedGrid getCarried(ByteReader& in) {
+  enum class SavedAsHalf { kNo, kYes };
+  CarriedGrid grid;
+  grid.name = in.getString();
+  grid.treeType = in.getString();
+  grid.savedAsHalf = in.getEnum(SavedAsHalf::kYes, "mark of half floats") == SavedAsHalf::kYes;
+  grid.vdbVersion = in.get<std::uint32_t>();
+  grid.place = in.get<std::uint32_t>();
+  grid.blocksAt = in.get<std::uint64_t>();
+  return grid;
+}
+
+// ---- The curve of a fit
+
+namespace {
+
+constexpr std::size_t kPointBytes = 28;
+
+/// A PSNR is infinite where the error is zero.
+bool valid(const CurvePoint& p) {
+  return std::isfinite(p.maxError) && !std::isnan(p.psnrBox) && !std::isnan(p.psnrActive);
+}
+constexpr const char* kInvalid = "a point of the curve is not a number";
+
+/// Calls `visit` with each member of a point and a number of its type in the file, in the order of the file.
+template <class Visit>
+void forEachMember(Visit visit) {
+  visit(&CurvePoint::ellipsoids, std::uint64_t{});
+  visit(&CurvePoint::psnrBox, float{});
+  visit(&CurvePoint::psnrActive, float{});
+  visit(&CurvePoint::maxError, double{});
+  visit(&CurvePoint::iteration, std::uint32_t{});
+}
+
+}  // namespace
+
+std::vector<std::byte> putCurve(std::span<const CurvePoint> curve) {
+  if (!std::all_of(curve.begin(), curve.end(), valid)) throw RuntimeFailure(kInvalid);
+  ByteWriter out;
+  forEachMember([&](auto member, auto stored) {
+    for (const auto& point : curve) out.put(decltype(stored)(point.*member));
+  });
+  return out.take();
+}
+
+std::vector<CurvePoint> getCurve(std::span<const std::byte> content, const std::string& where) {
+  ByteReader in(content, where);
+  if (content.size() % kPointBytes != 0) in.fail("not a whole number of points");
+  std::vector<CurvePoint> curve(content.size() / kPointBytes);
+  forEachMember([&](auto member, auto stored) {
+    for (auto& point : curve) point.*member = in.get<decltype(stored)>();
+  });
+  if (!std::all_of(curve.begin(), curve.end(), valid)) in.fail(kInvalid);
+  return curve;
+}
+
+// ---- The errors of layers
+
+namespace {
+
+constexpr std::size_t kRecordBytes = 2 * sizeof(float);
+
+}  // namespace
+
+std::vector<std::byte> putLayerErrors(std::span<const LayerError> errors) {
+  ByteWriter out;
+  for (const LayerError& error : errors) {
+    out.put(error.psnrBox);
+    out.put(error.maxError);
+  }
+  return out.take();
+}
+
+std::vector<LayerError> getLayerErrors(std::span<const std::byte> content, std::size_t layers,
+                                       const std::string& where) {
+  ByteReader in(content, where);
+  if (content.size() != layers * kRecordBytes)
+    in.fail("not a table of " + std::to_string(layers) + " layers");
+  std::vector<LayerError> errors(layers);
+  for (LayerError& error : errors) {
+    error.psnrBox = in.get<float>();
+    error.maxError = in.get<float>();
+    if (std::isnan(error.psnrBox) || !std::isfinite(error.maxError))
+      in.fail("the error of a layer is no number");
+  }
+  return errors;
+}
+
+// ---- All records in one section
+
+namespace {
+
+constexpr SectionId kJoined{SectionKind::kGridRecords};
+
+std::vector<std::vector<std::byte>> getRecords(SectionReader& sections) {
+  const std::uint64_t stored = sections.storedBytes(kJoined);
+  const auto content = sections.get(kJoined);
+  ByteReader in(content, sections.place(kJoined));
+  std::vector<std::vector<std::byte>> records;
+  while (in.left() > 0) {
+    if (records.size() == stored) in.fail("more records than it has stored bytes");
+    records.push_back(in.getBlob());
+  }
+  return records;
+}
+
+}  // namespace
+
+std::vector<std::byte> putRecords(const std::vector<std::vector<std::byte>>& records) {
+  ByteWriter out;
+  for (const auto& record : records) out.putSized(record);
+  return out.take();
+}
+
+GridRecords::GridRecords(SectionReader& sections)
+    : sections_(sections), isJoined_(sections.has(kJoined)) {
+  if (isJoined_) joined_ = getRecords(sections);
+}
+
+std::uint32_t GridRecords::count() const {
+  return isJoined_ ? std::uint32_t(joined_.size()) : sections_.count(SectionKind::kGrid);
+}
+
+std::vector<std::byte> GridRecords::take(std::uint32_t grid) {
+  if (!isJoined_) return sections_.get({SectionKind::kGrid, grid});
+  if (next_ == joined_.size()) throw BadInput(place(grid) + ": there is no record of it");
+  return std::move(joined_[next_++]);
+}
+
+std::string GridRecords::place(std::uint32_t grid) const {
+  if (!isJoined_) return sections_.place({SectionKind::kGrid, grid});
+  return sections_.place(kJoined) + ": grid " + std::to_string(grid);
+}
+
+// ---- The rules
+
+namespace {
+
+bool finite(double v) { return std::isfinite(v); }
+
+bool allFinite(std::initializer_list<double> values) {
+  return std::all_of(values.begin(), values.end(), finite);
+}
+
+bool validKernel(const Kernel& kernel) {
+  return finite(kernel.kappa) && kernel.epsilon > 0.0f && kernel.epsilon < 1.0f;
+}
+
+bool validAffine(const Transform& transform) {
+  return !transform.affine ||
+         std::all_of(transform.affine->begin(), transform.affine->end(), finite);
+}
+
+std::optional<Fault> nonFinite(SectionKind section, const char* what,
+                               std::span<const std::vector<float>> planes) {
+  for (const auto& plane : planes) {
+    const auto it = std::find_if_not(plane.begin(), plane.end(), finite);
+    if (it != plane.end())
+      return Fault{section, std::string(what) + " of ellipsoid " +
+                                std::to_string(it - plane.begin()) + " is not finite"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Fault> extremeScale(const std::array<std::vector<float>, 3>& logScale) {
+  const auto extreme = [](float v) { return std::abs(v) > kMaxLogScale; };
+  for (const auto& plane : logScale) {
+    const auto it = std::find_if(plane.begin(), plane.end(), extreme);
+    if (it != plane.end())
+      return Fault{SectionKind::kScales, "a scale of ellipsoid " +
+                                             std::to_string(it - plane.begin()) +
+                                             " is not between e^-32 and e^32 voxels"};
+  }
+  return std::nullopt;
+}
+
+/// The bytes of OpenVDB's maps, which consist of vectors and of matrices of doubles. A frustum holds
+/// another map, so that only its smallest size is known.
+struct MapSize {
+  std::string_view type;
+  std::size_t bytes = 0;
+};
+constexpr std::size_t kVector = 3 * sizeof(double), kMatrix = 16 * sizeof(double);
+constexpr std::array kMapSizes{MapSize{"UniformScaleMap", 5 * kVector},
+                               MapSize{"ScaleMap", 5 * kVector},
+                               MapSize{"TranslationMap", kVector},
+                               MapSize{"UniformScaleTranslateMap", 6 * kVector},
+                               MapSize{"ScaleTranslateMap", 6 * kVector},
+                               MapSize{"UnitaryMap", kMatrix},
+                               MapSize{"AffineMap", kMatrix}};
+constexpr MapSize kFrustum{"NonlinearFrustumMap", 3 * kVector + kVector};
+
+}  // namespace
+
+std::optional<Fault> mapFaultOf(const Transform& transform) {
+  const std::size_t bytes = transform.map.size();
+  const auto known = std::ranges::find(kMapSizes, transform.mapType, &MapSize::type);
+  const bool isGood = transform.mapType == kFrustum.type
+                          ? bytes > kFrustum.bytes
+                          : known == kMapSizes.end() || bytes == known->bytes;
+  if (isGood) return std::nullopt;
+  return Fault{SectionKind::kGrid, "the transform is damaged: " + std::to_string(bytes) +
+                                       " bytes are not a map of type " + transform.mapType};
+}
+
+std::optional<Fault> faultOf(const StoredGrid& grid) {
+  const auto fault = [](const char* text) { return Fault{SectionKind::kGrid, text}; };
+  if (!allFinite({grid.descriptor.background, grid.field.background}))
+    return fault("the background is not finite");
+  if (!validAffine(grid.descriptor.transform)) return fault("the affine map is not finite");
+  if (!validKernel(grid.field.kernel))
+    return fault("the kernel's kappa is not finite or its epsilon not between 0 and 1");
+  if (grid.farBackground && grid.topology != TopologyKind::kMask &&
+      grid.topology != TopologyKind::kThreshold)
+    return fault("a far background needs a mask or voxels");
+  if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
+  if (grid.topology == TopologyKind::kBlocks && !(grid.activeThreshold > 0.0f))
+    return fault("the threshold of blocks is not above 0");
+  if (!allFinite({grid.valueMin, grid.valueMax}) || grid.valueMin > grid.valueMax)
+    return fault("the range of values is not finite or empty");
+  return std::nullopt;
+}
+
+std::optional<Fault> residualFaultOf(const StoredGrid& grid) {
+  const auto fault = [](const char* text) { return Fault{SectionKind::kResidual, text}; };
+  if (!grid.residual) return std::nullopt;
+  if (grid.voxels) return fault("a residual to voxels that are stored themselves");
+  if (grid.residual->form != VoxelForm::kQuantised)
+    return fault("a residual that is not quantised");
+  for (const BrickMask& mask : grid.residual->active)
+    if (mask.count() != kBrickVoxels) return fault("a residual with voxels that are not active");
+  return std::nullopt;
+}
+
+std::optional<Fault> faultOf(StoredComponents components) {
+  const GridDescriptor& first = components.front().descriptor;
+  for (const StoredGrid& component : components) {
+    const GridDescriptor& d = component.descriptor;
+    if (d.gridClass != first.gridClass || d.valueType != first.valueType ||
+        d.transform != first.transform)
+      return Fault{SectionKind::kVector, "its components differ in class, value type or transform"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Fault> faultOf(const Ellipsoids& e) {
+  if (auto f = nonFinite(SectionKind::kCenters, "the center", e.center)) return f;
+  if (auto f = nonFinite(SectionKind::kScales, "a scale", e.logScale)) return f;
+  if (auto f = extremeScale(e.logScale)) return f;
+  if (auto f = nonFinite(SectionKind::kRotations, "the rotation", e.rotation)) return f;
+  if (auto f = nonFinite(SectionKind::kIntensities, "the intensity", {&e.intensity, 1})) return f;
+  if (auto f = nonFinite(SectionKind::kKappas, "the kappa", {&e.kappa, 1})) return f;
+  if (!wellFormed(e)) return Fault{SectionKind::kRotations, "a quaternion is not of unit length"};
+  return std::nullopt;
+}
+
+}  // namespace esvr::format

@@ -1,0 +1,283 @@
+// Sequences: frames as differences from the previous ones, the reader of their file, and its writer.
+
+#include "esvr/sequence_file.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include "core/partial_file.h"
+#include "esvr/error.h"
+#include "esvr/frame_coding.h"
+#include "format/decode.h"
+#include "format/encode.h"
+#include "format/frame_table.h"
+#include "format/sequence_index.h"
+
+namespace esvr {
+namespace {
+
+using namespace format;
+
+}  // namespace
+
+// ---- Frames
+
+std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previous) {
+  if (previous)
+    if (auto differences = differencesOf(frame, *previous))
+      return differences->sections.assembleFrame(differences->inherited);
+  return encodeEsvr(frame);
+}
+
+EsvrFile decodeFrame(std::span<const std::byte> bytes, const std::string& nameForErrors,
+                     const ReadLimits& limits, const EsvrFile* previous) {
+  if (!isShortFrame(bytes)) return decodeEsvr(bytes, nameForErrors, limits);
+  if (!previous) throw BadInput(nameForErrors + ": it cannot be read without the frame before");
+  return decodeShort(bytes, nameForErrors, limits, *previous);
+}
+
+bool dependsOnPrevious(std::span<const std::byte> bytes) {
+  if (isShortFrame(bytes)) return true;
+  (void)readTable(MemorySource(bytes, "frame"));
+  return false;
+}
+
+std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous) {
+  const std::uint64_t own = bytesAdded(grid);
+  if (previous)
+    if (const auto difference = differenceOf(grid, *previous, own))
+      return difference->size() + kFrameRowBytes;
+  return own;
+}
+
+// ---- The reader
+
+bool holdsSequence(const std::filesystem::path& path) {
+  return isSequence(readTable(FileSource(path)));
+}
+
+class SequenceReader::File {
+ public:
+  File(const std::filesystem::path& path, const ReadLimits& limits)
+      : source_(path), limits_(limits), groups_(readGroups(source_)), frames_(framesOf(groups_)) {
+    for (const FrameGroup& group : groups_) {
+      firstOf_.push_back(frameCount_);
+      frameCount_ += group.frames.size();
+    }
+  }
+
+  [[nodiscard]] const std::vector<SequenceFrame>& frames() const { return frames_; }
+  [[nodiscard]] std::size_t groupCount() const { return groups_.size(); }
+  [[nodiscard]] std::uint64_t fileBytes() const { return source_.size(); }
+  [[nodiscard]] std::uint64_t bytesRead() const { return source_.bytesRead(); }
+
+  const EsvrFile& read(std::int64_t number) {
+    const std::size_t wanted = indexOf(number);
+    for (std::size_t i = firstToDecode(wanted); i <= wanted; ++i) decode(i);
+    return *decoded_;
+  }
+
+  [[nodiscard]] EsvrSummary inspect(std::int64_t number) const {
+    return inspectEsvr(bytesOf(indexOf(number)), frameName(source_.name(), number));
+  }
+
+ private:
+  [[nodiscard]] std::size_t indexOf(std::int64_t number) const {
+    const auto at = std::ranges::lower_bound(frames_, number, {}, &SequenceFrame::number);
+    if (at == frames_.end() || at->number != number)
+      throw BadInput(source_.name() + ": there is no frame " + std::to_string(number));
+    return std::size_t(at - frames_.begin());
+  }
+
+  /// The frame after the one that was decoded last, if that helps to decode the wanted one;
+  /// otherwise the last frame up to the wanted one that refers to no other.
+  [[nodiscard]] std::size_t firstToDecode(std::size_t wanted) const {
+    std::size_t first = wanted;
+    while (frames_[first].dependsOnPrevious && lastDecoded_ != first) --first;
+    return lastDecoded_ == first ? first + 1 : first;
+  }
+
+  [[nodiscard]] std::vector<std::byte> bytesOf(std::size_t i) const {
+    const std::size_t group = frames_[i].group;
+    return readFrame(source_, groups_[group], i - firstOf_[group]);
+  }
+
+  /// A frame that cannot be decoded leaves none, because it may need the one before it again.
+  void decode(std::size_t i) {
+    lastDecoded_.reset();
+    const bool depends = frames_[i].dependsOnPrevious;
+    if (!depends) decoded_.reset();
+    // Both frames are in memory until the new one is complete.
+    ReadLimits left = limits_;
+    if (depends && left.maxBytes != kNoMemoryLimit)
+      left.maxBytes -= std::min(left.maxBytes, contentBytes(*decoded_));
+    EsvrFile frame = decodeFrame(bytesOf(i), frameName(source_.name(), frames_[i].number), left,
+                                 depends ? &*decoded_ : nullptr);
+    decoded_ = std::move(frame);
+    lastDecoded_ = i;
+  }
+
+  FileSource source_;
+  ReadLimits limits_;
+  std::vector<FrameGroup> groups_;
+  std::vector<SequenceFrame> frames_;
+  std::vector<std::size_t> firstOf_;  ///< index of the first frame of each group
+  std::size_t frameCount_ = 0;
+  std::optional<EsvrFile> decoded_;
+  std::optional<std::size_t> lastDecoded_;  ///< index of the frame that is decoded
+};
+
+SequenceReader::SequenceReader(const std::filesystem::path& path, const ReadLimits& limits)
+    : file_(std::make_unique<File>(path, limits)) {}
+SequenceReader::~SequenceReader() = default;
+
+const std::vector<SequenceFrame>& SequenceReader::frames() const { return file_->frames(); }
+std::size_t SequenceReader::groupCount() const { return file_->groupCount(); }
+std::uint64_t SequenceReader::fileBytes() const { return file_->fileBytes(); }
+const EsvrFile& SequenceReader::read(std::int64_t number) { return file_->read(number); }
+EsvrSummary SequenceReader::inspect(std::int64_t number) { return file_->inspect(number); }
+std::uint64_t SequenceReader::bytesRead() const { return file_->bytesRead(); }
+
+// ---- The writer
+
+namespace {
+
+PartialStart startOf(PartialSequence partial) {
+  return partial == PartialSequence::kRefuse ? PartialStart::kRefuse : PartialStart::kContinue;
+}
+
+/// The file of that name may be somebody else's.
+void requireOurs(const PartialFile& file, PartialSequence partial) {
+  const FileSource source(file.path());
+  const auto expected = std::as_bytes(std::span(kMagic));
+  const auto begin = source.read(0, std::min<std::uint64_t>(source.size(), expected.size()));
+  if (std::ranges::equal(begin, expected.first(begin.size()))) return;
+  const std::string text = "cannot write " + file.path().string() +
+                           ": it is there, and is no part of an .esvr file; remove it or rename it";
+  if (partial == PartialSequence::kResume) throw BadInput(text);
+  throw RuntimeFailure(text);
+}
+
+}  // namespace
+
+class SequenceWriter::File {
+ public:
+  File(const std::filesystem::path& path, const SequenceWriteOptions& options)
+      : name_(path.string()), file_(path, options.overwrite, startOf(options.partial)) {
+    requireOurs(file_, options.partial);
+    if (options.partial == PartialSequence::kResume && file_.size() > kHeaderBytes)
+      groups_ = findGroups(FileSource(file_.path()));
+    dropGroups(groups_.size());
+  }
+  ~File() {
+    if (groups_.empty() && !finished_) discard();
+  }
+
+  [[nodiscard]] const std::vector<SequenceFrame>& frames() const { return frames_; }
+  [[nodiscard]] std::size_t groupCount() const { return groups_.size(); }
+
+  /// Removes everything after the first n groups.
+  void dropGroups(std::size_t n) {
+    groups_.resize(std::min(n, groups_.size()));
+    frames_ = framesOf(groups_);
+    // The header comes first: a complete one must not stand before a shorter file.
+    file_.replaceStart(partialHeader());
+    file_.truncate(endOf(groups_));
+    file_.flush();
+  }
+
+  void append(std::int64_t number, std::vector<std::byte> bytes) {
+    const bool depends = dependsOnPrevious(bytes);
+    if (const auto last = lastNumber(); last && number <= *last)
+      refuse(number, "its number is not above " + std::to_string(*last));
+    if (depends && entries_.empty())
+      refuse(number, "it begins a group, but refers to another frame");
+    entries_.push_back({number, bytes.size(), checksum(bytes), depends});
+    contents_.push_back(std::move(bytes));
+  }
+
+  void endGroup() {
+    if (entries_.empty()) return;
+    FrameGroup group{endOf(groups_), std::exchange(entries_, {})};
+    write(group, std::exchange(contents_, {}));
+    groups_.push_back(std::move(group));
+    const auto added = framesOf({groups_.back()});
+    for (SequenceFrame frame : added) {
+      frame.group = groups_.size() - 1;
+      frames_.push_back(frame);
+    }
+  }
+
+  std::uint64_t finish() {
+    endGroup();
+    if (groups_.empty()) throw RuntimeFailure("cannot write " + name_ + ": there is no frame");
+    const SequenceEnd end = encodeEnd(groups_);
+    file_.append(end.bytes);
+    file_.flush();  // the header makes the file valid, and must not reach the disk before its end
+    file_.replaceStart(end.header);
+    const std::uint64_t bytes = file_.size();
+    file_.commit();
+    finished_ = true;
+    return bytes;
+  }
+
+ private:
+  [[noreturn]] void refuse(std::int64_t number, const std::string& why) const {
+    throw UsageError(frameName(name_, number) + " cannot be appended: " + why);
+  }
+
+  [[nodiscard]] std::optional<std::int64_t> lastNumber() const {
+    if (!entries_.empty()) return entries_.back().number;
+    return frames_.empty() ? std::nullopt : std::optional(frames_.back().number);
+  }
+
+  /// Writes frame by frame, so that no second copy of the group is in memory.
+  void write(const FrameGroup& group, const std::vector<std::vector<std::byte>>& contents) {
+    const auto offsets = frameOffsets(group);
+    const auto directory = encodeDirectory(group);
+    appendPadded(directory, offsets.front() - group.offset);
+    for (std::size_t i = 0; i < contents.size(); ++i)
+      appendPadded(contents[i], offsets[i + 1] - offsets[i]);
+    file_.flush();
+  }
+
+  void appendPadded(std::span<const std::byte> bytes, std::uint64_t size) {
+    file_.append(bytes);
+    file_.append(std::vector<std::byte>(size - bytes.size()));
+  }
+
+  /// Empties the file, so that nothing of it stays.
+  void discard() noexcept try {
+    file_.truncate(0);
+  } catch (const Error&) {  // a header without groups stays, which a later run may continue
+  }
+
+  std::string name_;
+  PartialFile file_;
+  std::vector<FrameGroup> groups_;
+  std::vector<SequenceFrame> frames_;
+  std::vector<FrameEntry> entries_;  ///< of the group that is not complete
+  std::vector<std::vector<std::byte>> contents_;
+  bool finished_ = false;
+};
+
+SequenceWriter::SequenceWriter(const std::filesystem::path& path,
+                               const SequenceWriteOptions& options)
+    : file_(std::make_unique<File>(path, options)) {}
+SequenceWriter::~SequenceWriter() = default;
+
+std::filesystem::path SequenceWriter::partialPath(const std::filesystem::path& path) {
+  return PartialFile::pathFor(path);
+}
+
+const std::vector<SequenceFrame>& SequenceWriter::frames() const { return file_->frames(); }
+std::size_t SequenceWriter::groupCount() const { return file_->groupCount(); }
+void SequenceWriter::dropGroups(std::size_t group) { file_->dropGroups(group); }
+void SequenceWriter::append(std::int64_t number, std::vector<std::byte> frame) {
+  file_->append(number, std::move(frame));
+}
+void SequenceWriter::endGroup() { file_->endGroup(); }
+std::uint64_t SequenceWriter::finish() { return file_->finish(); }
+
+}  // namespace esvr
