@@ -1,29 +1,116 @@
+#ifdef ESVR_WITH_ZFP
+#include <zfp.h>
+#endif
+
+#include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
 
-#include "baselines/brick_stack.h"
-#include "baselines/dense_box.h"
-#include "baselines/drop_voxels.h"
-#include "baselines/zfp_codec.h"
+#include "baselines/voxels.h"
 #include "core/add_seconds.h"
 #include "esvr/baseline.h"
 #include "esvr/error.h"
+#include "esvr/grid_names.h"
 
 namespace esvr {
 namespace {
 
 using baselines::DenseBox;
 
-void writeBytes(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+// ZFP on an array. In a build without ZFP, both functions throw UsageError.
+
+#ifdef ESVR_WITH_ZFP
+
+struct FreeField {
+  void operator()(zfp_field* field) const { zfp_field_free(field); }
+};
+struct CloseStream {
+  void operator()(zfp_stream* stream) const { zfp_stream_close(stream); }
+};
+struct CloseBits {
+  void operator()(bitstream* bits) const { stream_close(bits); }
+};
+using ZfpField = std::unique_ptr<zfp_field, FreeField>;
+using ZfpStream = std::unique_ptr<zfp_stream, CloseStream>;
+using ZfpBits = std::unique_ptr<bitstream, CloseBits>;
+
+ZfpField fieldOf(DenseBox& dense) {
+  const auto [nx, ny, nz] = dense.side();
+  return ZfpField(zfp_field_3d(dense.values.data(), zfp_type_float, nx, ny, nz));
+}
+
+/// Compresses an array to a ZFP stream with a header.
+/// \param grid  name of the array's grid, for messages
+/// \throws UsageError  the precision is out of range, the box has more than 65,536 voxels along an
+///                     axis, or the build has no ZFP
+std::vector<std::byte> compressZfp(const DenseBox& dense, const ZfpSetting& setting,
+                                   const std::string& grid) {
+  DenseBox& source = const_cast<DenseBox&>(dense);  // ZFP takes no const pointer, but only reads
+  const ZfpField field = fieldOf(source);
+  const ZfpStream stream(zfp_stream_open(nullptr));
+  if (setting.mode == ZfpMode::kAccuracy) {
+    zfp_stream_set_accuracy(stream.get(), setting.amount);
+  } else {
+    const auto planes = unsigned(setting.amount);
+    if (double(planes) != setting.amount || planes < 1 || planes > kMaxZfpPlanes)
+      throw UsageError("zfp: precision must be a whole number from 1 to " +
+                       std::to_string(kMaxZfpPlanes));
+    zfp_stream_set_precision(stream.get(), planes);
+  }
+  std::vector<std::byte> bytes(zfp_stream_maximum_size(stream.get(), field.get()));
+  const ZfpBits bits(stream_open(bytes.data(), bytes.size()));
+  zfp_stream_set_bit_stream(stream.get(), bits.get());
+  zfp_stream_rewind(stream.get());
+  if (zfp_write_header(stream.get(), field.get(), ZFP_HEADER_FULL) == 0)
+    throw UsageError("grid '" + shownName(grid) + "': ZFP has no array of this size");
+  const std::size_t size = zfp_compress(stream.get(), field.get());
+  if (size == 0)
+    throw RuntimeFailure("grid '" + shownName(grid) + "': ZFP failed to compress its voxels");
+  bytes.resize(size);
+  return bytes;
+}
+
+/// Decompresses a stream to an array of the same box.
+/// \param file  name of the stream's file, for messages
+/// \throws BadInput  the stream does not belong to such an array
+void decompressZfp(std::span<const std::byte> bytes, const std::filesystem::path& file,
+                   DenseBox& dense) {
+  const ZfpField field = fieldOf(dense);
+  const ZfpStream stream(zfp_stream_open(nullptr));
+  const ZfpBits bits(stream_open(const_cast<std::byte*>(bytes.data()), bytes.size()));
+  zfp_stream_set_bit_stream(stream.get(), bits.get());
+  zfp_stream_rewind(stream.get());
+  const bool read = zfp_read_header(stream.get(), field.get(), ZFP_HEADER_FULL) != 0 &&
+                    zfp_field_size(field.get(), nullptr) == dense.values.size() &&
+                    zfp_decompress(stream.get(), field.get()) != 0;
+  if (!read) throw BadInput(file.string() + ": the ZFP stream does not belong to this box");
+}
+
+#else
+
+[[noreturn]] void refuseZfp() {
+  throw UsageError("this build has no ZFP (libzfp-dev was not found)");
+}
+std::vector<std::byte> compressZfp(const DenseBox&, const ZfpSetting&, const std::string&) {
+  refuseZfp();
+}
+void decompressZfp(std::span<const std::byte>, const std::filesystem::path&, DenseBox&) {
+  refuseZfp();
+}
+
+#endif
+
+void writeStream(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   std::ofstream stream(path, std::ios::binary);
   stream.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
   stream.close();
   if (!stream) throw RuntimeFailure("cannot write " + path.string());
 }
 
-std::vector<std::byte> readBytes(const std::filesystem::path& path) {
+std::vector<std::byte> readStream(const std::filesystem::path& path) {
   std::vector<std::byte> bytes(std::filesystem::file_size(path));
   std::ifstream stream(path, std::ios::binary);
   stream.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
@@ -32,6 +119,15 @@ std::vector<std::byte> readBytes(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+std::string zfpVersion() {
+#ifdef ESVR_WITH_ZFP
+  return "ZFP " + std::to_string(ZFP_VERSION_MAJOR) + "." + std::to_string(ZFP_VERSION_MINOR) +
+         "." + std::to_string(ZFP_VERSION_PATCH);
+#else
+  return {};
+#endif
+}
 
 /// Data that several settings share: the OpenVDB grid of the last threshold, and ZFP's array.
 /// Each is made when it is first needed.
@@ -76,10 +172,9 @@ struct BaselineEncoder::State {
     return secondsOf([&] {
       std::vector<std::byte> bytes;
       if (array->bricks) bytes = baselines::encodeBricks(source.grid.volume.bricks);
-      const auto stream =
-          baselines::compressZfp(array->dense, setting, source.grid.descriptor.name);
+      const auto stream = compressZfp(array->dense, setting, source.grid.descriptor.name);
       bytes.insert(bytes.end(), stream.begin(), stream.end());
-      writeBytes(file(), bytes);
+      writeStream(file(), bytes);
     });
   }
   struct ZfpVoxels {
@@ -90,10 +185,10 @@ struct BaselineEncoder::State {
     return {{array->dense.box, std::vector<float>(array->dense.values.size())}, {}};
   }
   void decodeZfp(ZfpVoxels& into) const {
-    const auto all = readBytes(file());
+    const auto all = readStream(file());
     std::span<const std::byte> bytes = all;
     if (array->bricks) into.bricks = baselines::decodeBricks(bytes);
-    baselines::decompressZfp(bytes, file(), into.dense);
+    decompressZfp(bytes, file(), into.dense);
   }
 };
 

@@ -5,8 +5,7 @@
 #include <optional>
 #include <span>
 
-#include "baselines/drop_voxels.h"
-#include "baselines/zfp_codec.h"
+#include "baselines/voxels.h"
 #include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
@@ -129,7 +128,7 @@ std::vector<BaselineSetting> ladder(ZfpSetting zfp, double peak) {
     settings.push_back({.how = zfp});
   };
   if (zfp.mode == ZfpMode::kPrecision) {
-    for (unsigned planes = 1; planes <= baselines::kMaxZfpPlanes; ++planes) add(planes);
+    for (unsigned planes = 1; planes <= kMaxZfpPlanes; ++planes) add(planes);
     return settings;
   }
   const int first = std::ilogb(peak) + 3;  // above the peak, since ZFP's errors are below its bound

@@ -10,7 +10,7 @@
 #include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "vdb/test_files.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {

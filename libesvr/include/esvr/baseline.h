@@ -22,6 +22,8 @@ enum class ZfpMode {
   kPrecision  ///< number of bit planes that each block of 4^3 voxels keeps
 };
 
+inline constexpr unsigned kMaxZfpPlanes = 32;  ///< bit planes of a float
+
 struct ZfpSetting {
   ZfpMode mode = ZfpMode::kAccuracy;
   double amount = 0.0;
