@@ -1,15 +1,23 @@
+#include "page/page.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include "capi/objects.h"
+#include "esvr/camera.h"
 #include "esvr/transfer_function.h"
-#include "page/page.h"
+#include "render/sample_rule.h"
+#include "render/transfer_table.h"
 
 namespace esvr::page {
 namespace {
+
+// Descriptions as JSON
 
 /// Writes JSON. Numbers are float64 texts that give the same number again.
 class Json {
@@ -163,6 +171,56 @@ std::string looksText() {
 /// A copy that the caller frees; null if there is no memory.
 char* copyOf(const std::string& text) { return strdup(text.c_str()); }
 
+// The tables of a transfer function
+
+TransferFunction functionOf(const page_transfer& t) {
+  TransferFunction f;
+  f.colors.space = ColorSpace(t.space);
+  for (const double* p = t.colors; p != t.colors + 4 * t.color_count; p += 4)
+    f.colors.points.push_back({p[0], {p[1], p[2], p[3]}});
+  for (const double* p = t.opacity; p != t.opacity + 4 * t.opacity_count; p += 4)
+    f.opacity.push_back({p[0], p[1], p[2], p[3]});
+  checkTransferFunction(f);
+  return f;
+}
+
+/// Tables, and what their pointers point to.
+struct Tables : page_tables {
+  Tables(const TransferFunction& f, const page_sampling& sampling)
+      : page_tables{}, table(f, Sampling{sampling.length, sampling.side > 1}) {
+    const TransferTableView view = table.view();
+    intervals = TransferTableView::kIntervals;
+    low = view.low, scale = view.scale;
+    weak_gradient_squared = lightRule({}, View({}, {}), f).weakSquared;  // the same for every view
+    static_assert(sizeof(Classified) == 4 * sizeof(float));
+    values = &view.entries->r;
+    if (sampling.side > 1) fillSegments(view.segments, sampling);
+  }
+  TransferTable table;
+  std::vector<PixelColor> lights{};
+
+ private:
+  void fillSegments(const SegmentTableView& view, const page_sampling& sampling) {
+    const double apart = (sampling.last - sampling.first) / (sampling.side - 1);
+    const auto valueAt = [&](int i) { return float(sampling.first + i * apart); };
+    lights.reserve(std::size_t(sampling.side) * std::size_t(sampling.side));
+    for (int j = 0; j < sampling.side; ++j)
+      for (int i = 0; i < sampling.side; ++i) lights.push_back(view(valueAt(i), valueAt(j)));
+    static_assert(sizeof(PixelColor) == 4 * sizeof(float));
+    segments = &lights.front().r;
+    std::copy_n(view.entries[0].mean.c, 4, below);
+    std::copy_n(view.entries[intervals + 1].mean.c, 4, above);
+  }
+};
+
+// Cameras
+
+Projection projectionOf(int orthographic) {
+  return orthographic != 0 ? Projection::kOrthographic : Projection::kPerspective;
+}
+
+Vec3 placeAt(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
+
 }  // namespace
 }  // namespace esvr::page
 
@@ -178,4 +236,46 @@ char* page_looks() {
   char* text = nullptr;
   (void)capi::guarded([&] { text = page::copyOf(page::looksText()); });
   return text;
+}
+
+void page_histogram(const esvr_volume* volume, double low, double high, int count, double* counts) {
+  std::fill_n(counts, count, 0.0);
+  const double perUnit = high > low ? count / (high - low) : 0.0;
+  const SparseVolume& voxels = volume->voxels;
+  for (std::size_t b = 0; b < voxels.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (!voxels.active[b].test(v)) continue;
+      const double place = (double(voxels.brickValues(b)[std::size_t(v)]) - low) * perUnit;
+      ++counts[int(std::clamp(place, 0.0, double(count - 1)))];
+    }
+}
+
+page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling) {
+  std::unique_ptr<page::Tables> tables;
+  (void)capi::guarded(
+      [&] { tables = std::make_unique<page::Tables>(page::functionOf(*transfer), *sampling); });
+  return tables.release();
+}
+
+void page_free_tables(page_tables* tables) { delete static_cast<page::Tables*>(tables); }
+
+void page_fit(const int* box, const double* direction, int orthographic, int width, int height,
+              double* camera) {
+  CameraWish wish;
+  wish.projection = page::projectionOf(orthographic);
+  if (direction != nullptr) wish.direction = page::placeAt(direction);
+  const Box voxels{{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
+  const Camera fitted = fitCamera(voxels, wish, {width, height});
+  for (const Vec3& place : {fitted.eye, fitted.center, fitted.up})
+    camera = std::copy(place.begin(), place.end(), camera);
+  *camera = orthographic != 0 ? fitted.height : fitted.fov;
+}
+
+esvr_status page_check_camera(const double* camera, int orthographic, int width, int height) {
+  return capi::guarded([&] {
+    Camera c{page::placeAt(camera), page::placeAt(camera + 3), page::placeAt(camera + 6),
+             page::projectionOf(orthographic)};
+    (orthographic != 0 ? c.height : c.fov) = camera[9];
+    checkCamera(c, {width, height});
+  });
 }

@@ -1,12 +1,18 @@
-// The checksum of the file format (format/bytes.h) in the decoder-only build: XXH64 after its
-// specification (Y. Collet, "xxHash fast digest algorithm", version 0.2).
-
-#include "format/bytes.h"
+// What the decoder-only build has in place of libraries. xxHash: the checksum of the file format
+// (format/bytes.h) is XXH64 after its specification (Y. Collet, "xxHash fast digest algorithm", version
+// 0.2). Files mapped into memory: voxels are in memory only. Blosc: there are no bytes of carried grids, which
+// mean nothing without OpenVDB.
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
+#include <new>
+
+#include "esvr/error.h"
+#include "esvr/voxel_memory.h"
+#include "format/carried_bytes.h"
+#include "format/checksum.h"
 
 namespace {
 
@@ -100,3 +106,26 @@ std::uint64_t RunningChecksum::value() const { return state_->value(); }
 void RunningChecksum::Free::operator()(XXH64_state_s* state) const { delete state; }
 
 }  // namespace esvr::format
+
+namespace esvr {
+
+VoxelMemory::VoxelMemory(const Files&) {
+  throw RuntimeFailure("this decoder keeps voxels in memory only, not in files");
+}
+
+bool VoxelMemory::isInFile(std::uint64_t) const { return false; }
+
+void* VoxelMemory::allocate(std::size_t bytes) const { return ::operator new(bytes); }
+
+void VoxelMemory::deallocate(void* array, std::size_t) const noexcept { ::operator delete(array); }
+
+namespace format {
+
+VoxelArray<std::byte> readCarried(const ByteSource&, const SectionTable&, std::size_t,
+                                  const VoxelMemory&) {
+  throw RuntimeFailure("this decoder has no carried grids");
+}
+
+}  // namespace format
+
+}  // namespace esvr
