@@ -1,57 +1,33 @@
 #include "vdb/archive.h"
 
+#include "vdb/open_vdb.h"
+
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/io.h>
 
+#include <numeric>
+
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
-#include "vdb/errors.h"
-#include "vdb/metadata.h"
-#include "vdb/transform.h"
-#include "vdb/tree_survey.h"
-#include "vdb/versions.h"
+#include "esvr/vdb_io.h"
+#include "vdb/properties.h"
+#include "vdb/tree_walk.h"
 
 namespace esvr::vdb {
 namespace {
 
 constexpr char kNameSeparator = '\x1e';
-constexpr const char* kHalfSuffix = "_HalfFloat";
-constexpr const char* kTreePrefix = "Tree_";
-constexpr std::uint64_t kUuidBytes = 36;
 
-std::string withoutSuffix(const std::string& text, const std::string& suffix) {
-  return text.ends_with(suffix) ? text.substr(0, text.size() - suffix.size()) : text;
-}
-
-/// An entry and the position of the next one.
-struct DirectoryRow {
-  ArchiveEntry entry;
-  std::int64_t next = 0;
-};
-
-/// Reads the entry up to its positions.
+/// Reads the entry of a directory up to its positions.
 ArchiveEntry readNames(InputFile& file) {
+  constexpr std::string_view kHalfSuffix = "_HalfFloat";
   ArchiveEntry entry;
   entry.storedName = file.readString();
-  const std::string type = file.readString();
-  entry.treeType = withoutSuffix(type, kHalfSuffix);
-  entry.savedAsHalf = entry.treeType != type;
+  entry.treeType = file.readString();
+  entry.savedAsHalf = entry.treeType.ends_with(kHalfSuffix);
+  if (entry.savedAsHalf) entry.treeType.resize(entry.treeType.size() - kHalfSuffix.size());
   entry.parent = file.readString();
   return entry;
-}
-
-DirectoryRow readRow(InputFile& file) {
-  DirectoryRow row{readNames(file)};
-  const auto gridAt = file.read<std::int64_t>();
-  const auto blocksAt = file.read<std::int64_t>();
-  row.next = file.read<std::int64_t>();
-  if (gridAt < std::int64_t(file.position()) || row.next < gridAt)
-    throw BadInput("is damaged: grid \"" + shownName(row.entry.name()) +
-                   "\" has no valid place in the file");
-  row.entry.gridAt = std::uint64_t(gridAt);
-  row.entry.gridBytes = std::uint64_t(row.next - gridAt);
-  row.entry.blocksAt = std::uint64_t(blocksAt);
-  return row;
 }
 
 }  // namespace
@@ -61,8 +37,9 @@ std::string ArchiveEntry::name() const {
 }
 
 std::string ArchiveEntry::valueType() const {
+  constexpr std::string_view kTreePrefix = "Tree_";
   if (!treeType.starts_with(kTreePrefix)) return shownName(treeType);
-  const auto begin = std::string(kTreePrefix).size();
+  const auto begin = kTreePrefix.size();
   return shownName(treeType.substr(begin, treeType.find('_', begin) - begin));
 }
 
@@ -75,9 +52,38 @@ bool beginsAsVdb(InputFile& file) {
 Archive::Archive(InputFile& file) : file_(file) {
   initializeOpenVdb();
   if (!beginsAsVdb(file_)) throw BadInput("is not a VDB file");
-  readHeader();
+  vdbVersion_ = file_.read<std::uint32_t>();
+  if (vdbVersion_ < kOldestFileVersion)
+    throw BadInput("has VDB format version " + std::to_string(vdbVersion_) + ", older than " +
+                   std::to_string(kOldestFileVersion) + ": save it anew with a current program");
+  const auto major = file_.read<std::uint32_t>();
+  const auto minor = file_.read<std::uint32_t>();
+  openvdb::io::setVersion(file_.stream(), {major, minor}, vdbVersion_);
+  hasPositions_ = file_.read<char>() != 0;
+  constexpr std::uint64_t kUuidBytes = 36;
+  file_.skip(kUuidBytes);
+
   metadata_ = readMetadata(file_);
-  readDirectory();
+  const auto count = file_.read<std::int32_t>();
+  if (count < 0) throw BadInput("is damaged: a negative number of grids");
+  if (!hasPositions_) {
+    readStreamedGrids(count);
+    return;
+  }
+  for (std::int32_t i = 0; i < count; ++i) {
+    ArchiveEntry entry = readNames(file_);
+    const auto gridAt = file_.read<std::int64_t>();
+    const auto blocksAt = file_.read<std::int64_t>();
+    const auto next = file_.read<std::int64_t>();
+    if (gridAt < std::int64_t(file_.position()) || next < gridAt)
+      throw BadInput("is damaged: grid \"" + shownName(entry.name()) +
+                     "\" has no valid place in the file");
+    entry.gridAt = std::uint64_t(gridAt);
+    entry.gridBytes = std::uint64_t(next - gridAt);
+    entry.blocksAt = std::uint64_t(blocksAt);
+    file_.seek(std::uint64_t(next));
+    addEntry(std::move(entry));
+  }
 }
 
 Archive::Archive(InputFile& file, const CarriedGrid& grid)
@@ -92,29 +98,6 @@ Archive::Archive(InputFile& file, const CarriedGrid& grid)
   entry.savedAsHalf = grid.savedAsHalf;
   entry.gridBytes = file.size();
   entry.blocksAt = grid.blocksAt;
-}
-
-void Archive::readHeader() {
-  vdbVersion_ = file_.read<std::uint32_t>();
-  if (vdbVersion_ < kOldestFileVersion)
-    throw BadInput("has VDB format version " + std::to_string(vdbVersion_) + ", older than " +
-                   std::to_string(kOldestFileVersion) + ": save it anew with a current program");
-  const auto major = file_.read<std::uint32_t>();
-  const auto minor = file_.read<std::uint32_t>();
-  openvdb::io::setVersion(file_.stream(), {major, minor}, vdbVersion_);
-  hasPositions_ = file_.read<char>() != 0;
-  file_.skip(kUuidBytes);
-}
-
-void Archive::readDirectory() {
-  const auto count = file_.read<std::int32_t>();
-  if (count < 0) throw BadInput("is damaged: a negative number of grids");
-  if (!hasPositions_) return readStreamedGrids(count);
-  for (std::int32_t i = 0; i < count; ++i) {
-    DirectoryRow row = readRow(file_);
-    file_.seek(std::uint64_t(row.next));
-    addEntry(std::move(row.entry));
-  }
 }
 
 void Archive::addEntry(ArchiveEntry entry) {
@@ -171,6 +154,74 @@ const ArchiveEntry& Archive::treeOwner(const ArchiveEntry& entry) const {
   const auto parent = owners_.find(entry.parent);
   if (parent == owners_.end()) throw BadInput("shares the voxels of a grid that is not there");
   return entries_[parent->second];
+}
+
+bool isPointTree(const std::string& treeType) {
+  return treeType.starts_with("Tree_ptdataidx") || treeType.starts_with("Tree_ptidx");
+}
+
+std::string whyNotCarried(const std::string& treeType, std::uint32_t vdbVersion) {
+  const std::string version = "the version of its VDB format, " + std::to_string(vdbVersion) + ", ";
+  if (vdbVersion < kOldestFileVersion || vdbVersion > kNewestFileVersion)
+    return version + "is not between " + std::to_string(kOldestFileVersion) + " and " +
+           std::to_string(kNewestFileVersion);
+  // The bytes of all other trees are the same in the versions that can be read.
+  if (isPointTree(treeType) && vdbVersion < openvdb::OPENVDB_FILE_VERSION_MULTIPASS_IO)
+    return version +
+           "stores points in another way than current files; save it anew with a current "
+           "program";
+  return {};
+}
+
+CarriedGrid carry(Archive& archive, std::size_t place, const VoxelMemory& memory) {
+  const ArchiveEntry& entry = archive.entries().at(place);
+  const ArchiveEntry& owner = archive.treeOwner(entry);
+  if (const auto why = whyNotCarried(entry.treeType, archive.vdbVersion()); !why.empty())
+    throw BadInput(why);
+  if (owner.treeType != entry.treeType)
+    throw BadInput("is damaged: it shares the voxels of a grid of another type");
+  const GridHead head = archive.readHead(entry);
+  CarriedGrid grid{.name = stringValue(head.metadata, openvdb::GridBase::META_GRID_NAME),
+                   .treeType = owner.treeType,
+                   .savedAsHalf = owner.savedAsHalf,
+                   .vdbVersion = archive.vdbVersion(),
+                   .place = std::uint32_t(place),
+                   .bytes = {}};
+
+  struct Range {
+    std::uint64_t at = 0, bytes = 0;
+  };
+  std::vector<Range> ranges;
+  if (entry.parent.empty()) {
+    ranges = {{entry.gridAt, entry.gridBytes}};
+    grid.blocksAt = entry.blocksAt - entry.gridAt;
+  } else {
+    // The flags are those with which the shared tree is compressed. They come before all else.
+    constexpr std::uint64_t kFlagBytes = sizeof(std::uint32_t);
+    const auto rangeTo = [](std::uint64_t begin, std::uint64_t end) {
+      if (end < begin) throw BadInput("is damaged: the grid is shorter than its metadata");
+      return Range{begin, end - begin};
+    };
+    const std::uint64_t treeAt = archive.readHead(owner).treeAt;
+    grid.blocksAt = head.treeAt - entry.gridAt + owner.blocksAt - treeAt;
+    ranges = {{owner.gridAt, kFlagBytes},
+              rangeTo(entry.gridAt + kFlagBytes, head.treeAt),
+              rangeTo(treeAt, owner.gridAt + owner.gridBytes)};
+  }
+
+  InputFile& file = archive.file();
+  const auto total =
+      std::accumulate(ranges.begin(), ranges.end(), std::uint64_t{0},
+                      [](std::uint64_t sum, const Range& range) { return sum + range.bytes; });
+  if (total > file.size()) throw BadInput("is damaged: a grid is larger than the file");
+  grid.bytes = VoxelArray<std::byte>(total, memory);
+  std::uint64_t done = 0;
+  for (const Range& range : ranges) {
+    file.seek(range.at);
+    file.read(grid.bytes.data() + done, range.bytes);
+    done += range.bytes;
+  }
+  return grid;
 }
 
 }  // namespace esvr::vdb

@@ -1,11 +1,11 @@
 #pragma once
-/// The directory of a .vdb file: the header, the file metadata and the position of each grid.
-/// OpenVDB reads the voxels from this stream (tree_reader.h). The directory is read here, because
-/// OpenVDB does not check sizes, cannot skip a grid of unknown type and does not keep the order of
-/// grids.
+/// The directory of a .vdb file (the header, the file metadata and the position of each grid), and its
+/// grids as bytes. OpenVDB reads the voxels from the stream of the file (read_vdb.cpp). The directory
+/// is read here, because OpenVDB does not check sizes, cannot skip a grid of unknown type and does not
+/// keep the order of grids.
 ///
 /// A file that was written to a stream, for example to a pipe, has no positions of grids. They are
-/// found by a walk over all trees (tree_survey.h), which reads no voxels. The end of a grid with a
+/// found by a walk over all trees (tree_walk.h), which reads no voxels. The end of a grid with a
 /// tree that cannot be walked over is known only if it is the last one, which ends with the file.
 
 #include <string>
@@ -14,7 +14,7 @@
 
 #include "esvr/carried_grid.h"
 #include "esvr/grid_descriptor.h"
-#include "vdb/input_file.h"
+#include "vdb/files.h"
 
 namespace esvr::vdb {
 
@@ -61,8 +61,6 @@ class Archive {
   [[nodiscard]] const ArchiveEntry& treeOwner(const ArchiveEntry& entry) const;
 
  private:
-  void readHeader();
-  void readDirectory();
   void addEntry(ArchiveEntry entry);
   void readStreamedGrids(std::int32_t count);
   void locate(ArchiveEntry& entry, bool isLast);
@@ -78,5 +76,16 @@ class Archive {
 
 /// True if the file begins as a .vdb file does.
 bool beginsAsVdb(InputFile& file);
+
+/// True if OpenVDB's name of a tree is that of points.
+bool isPointTree(const std::string& treeType);
+
+/// The reason, for the user, why a grid of a file of this version cannot be carried; else empty.
+std::string whyNotCarried(const std::string& treeType, std::uint32_t vdbVersion);
+
+/// A grid of an archive with the bytes that a file needs of it. A grid without a tree of its own gets
+/// the one that it shares.
+/// \throws BadInput  the grid cannot be carried, or is damaged
+CarriedGrid carry(Archive& archive, std::size_t place, const VoxelMemory& memory);
 
 }  // namespace esvr::vdb

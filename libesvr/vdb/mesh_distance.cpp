@@ -1,7 +1,6 @@
 #include "esvr/mesh_distance.h"
 
-#include "core/parallel.h"
-#include "vdb/trees.h"
+#include "vdb/open_vdb.h"
 
 #include <openvdb/math/Proximity.h>
 #include <openvdb/tools/MeshToVolume.h>
@@ -12,8 +11,9 @@
 #include <optional>
 #include <vector>
 
-#include "vdb/transform.h"
-#include "vdb/volume_to_tree.h"
+#include "core/parallel.h"
+#include "vdb/properties.h"
+#include "vdb/write_vdb.h"
 
 namespace esvr::vdb {
 namespace {

@@ -1,25 +1,78 @@
 #pragma once
-/// A walk over a grid's tree in a .vdb file (tree_survey.h has the layout) that checks all sizes
-/// and tells a visitor what the tree holds. The tree itself is never in memory.
+/// A walk over a grid's tree in a .vdb file that checks all sizes and tells a visitor what the tree
+/// holds. The tree itself is never in memory. OpenVDB does not check sizes (a negative chunk size makes
+/// it write beyond its buffers, a damaged Blosc header read beyond its input), so it gets a tree only
+/// after a walk has checked all of them. The survey of a tree is such a walk.
+///
+/// The layout of a tree of 32^3, 16^3 and 8^3 nodes, in OpenVDB's format versions from 222 on:
+///   1 (a buffer count), background, tile count, child count, tiles (coordinates, value, active),
+///   children (coordinates, upper node);
+///   a node: child mask, value mask, values (block), child nodes; a leaf: value mask;
+///   then for each leaf: value mask, values (block).
+///   A block: a byte that says how inactive values are stored, up to two of them, up to one mask,
+///   the values, compressed as the grid's flags say.
+
+#include "vdb/open_vdb.h"
 
 #include <blosc.h>
-
-#include "vdb/versions.h"
-
 #include <openvdb/io/Compression.h>
 
 #include <array>
 #include <bit>
+#include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "core/parallel.h"
+#include "esvr/coord.h"
 #include "esvr/error.h"
 #include "esvr/sparse_volume.h"
-#include "vdb/input_file.h"
-#include "vdb/tree_survey.h"
+#include "vdb/files.h"
 
 namespace esvr::vdb {
+
+/// The way in which a grid's values are stored in the file.
+struct ValueLayout {
+  std::uint64_t valueBytes = 4;   ///< size in memory: 4 for float, 8 for double, 12 for vec3s, ...
+  std::uint64_t halfBytes = 2;    ///< size of a value as half: 2 for float, 6 for vec3s, ...
+  bool savedAsHalf = false;       ///< in blocks, not in the background and the root's tiles
+  std::uint32_t compression = 0;  ///< OpenVDB's flags
+  /// How the values of a leaf are stored: as a mask and a block, in a number of bytes that is the
+  /// same for all leaves (bool, mask), or in a way of their own that is not known here (points).
+  enum class Leaves { kBlocks, kFixed, kOther } leaves = Leaves::kBlocks;
+  std::uint64_t leafBytes = 0;  ///< of kFixed
+};
+
+/// What decides how the values of a tree are stored.
+struct StoredTree {
+  std::string treeType;  ///< "Tree_float_5_4_3"
+  bool savedAsHalf = false;
+  std::uint32_t compression = 0;  ///< OpenVDB's flags
+};
+
+/// The layout of a tree; nothing if its nodes have other sizes than OpenVDB's usual ones, or if its
+/// type is unknown or has no fixed size, such as a string.
+[[nodiscard]] std::optional<ValueLayout> layoutOf(const StoredTree& tree);
+
+struct TreeSurvey {
+  std::uint64_t leaves = 0;
+  std::uint64_t activeVoxels = 0;  ///< including those of tiles
+  std::uint64_t tileBricks = 0;    ///< number of 8^3 bricks that the active tiles cover
+  Box activeBox;
+};
+
+/// Surveys the tree at the position of the file. \throws BadInput  it is truncated or damaged
+TreeSurvey surveyTree(InputFile& file, const ValueLayout& layout);
+
+/// Positions in a file; 0 if they are not known.
+struct TreeExtent {
+  std::uint64_t valuesAt = 0;  ///< of the values of the first leaf
+  std::uint64_t end = 0;       ///< behind the tree
+};
+
+/// Finds the end of the tree at the position of the file. \throws BadInput  as for surveyTree
+[[nodiscard]] TreeExtent extentOfTree(InputFile& file, const ValueLayout& layout);
 
 /// One bit for each cell of a node, as OpenVDB stores it, with z fastest.
 template <int kLog2>

@@ -7,11 +7,8 @@
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
 #include "vdb/archive.h"
-#include "vdb/carry.h"
-#include "vdb/errors.h"
-#include "vdb/nano_file.h"
-#include "vdb/read_nvdb.h"
-#include "vdb/read_vdb.h"
+#include "vdb/files.h"
+#include "vdb/readers.h"
 #include "vdb/write_nvdb.h"
 #include "vdb/write_vdb.h"
 
@@ -60,11 +57,15 @@ auto readVectors(const std::filesystem::path& path, const Read& read) {
   });
 }
 
+std::vector<std::string> storedNames(const VdbSummary& summary) {
+  std::vector<std::string> names;
+  for (const GridSummary& grid : summary.grids) names.push_back(grid.name);
+  return names;
+}
+
 /// Finds a grid that a user has named.
 NamedGrid namedIn(const std::filesystem::path& path, const std::string& name) {
-  std::vector<std::string> names;
-  for (const GridSummary& grid : inspectVdb(path).grids) names.push_back(grid.name);
-  return GridNames(std::move(names)).find(name, path);
+  return GridNames(storedNames(inspectVdb(path))).find(name, path);
 }
 
 /// The place of a grid that a user has named, of which components cannot be read.
@@ -77,14 +78,29 @@ std::size_t placeIn(const std::filesystem::path& path, const std::string& name) 
 }
 
 }  // namespace
+
+void requireGrid(std::size_t place, std::size_t grids) {
+  if (place < grids) return;
+  throw BadInput("has no grid number " + std::to_string(place + 1) + ", only " +
+                 std::to_string(grids) + (grids == 1 ? " grid" : " grids"));
+}
+
+std::string notAFloatType(const std::string& valueType) {
+  return "its values are of type " + valueType + "; only float, half and double can be fitted";
+}
+
 }  // namespace esvr::vdb
 
 namespace esvr {
 
 VdbSummary inspectVdb(const std::filesystem::path& path) {
   return vdb::readingFrom(path, [&](vdb::InputFile& file) {
-    return vdb::formatOf(file) == vdb::FileFormat::kOpenVdb ? vdb::inspectOpenVdb(file)
-                                                            : vdb::inspectNanoVdb(file);
+    VdbSummary summary = vdb::formatOf(file) == vdb::FileFormat::kOpenVdb
+                             ? vdb::inspectOpenVdb(file)
+                             : vdb::inspectNanoVdb(file);
+    const GridNames names(vdb::storedNames(summary));
+    for (std::size_t i = 0; i < names.size(); ++i) summary.grids[i].uniqueName = names.unique(i);
+    return summary;
   });
 }
 

@@ -1,16 +1,18 @@
 #include "esvr/voxel_packer.h"
 
+#include "vdb/open_vdb.h"
+
+#include <openvdb/io/Archive.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 
 #include "core/add_seconds.h"
 #include "esvr/error.h"
-#include "vdb/errors.h"
-#include "vdb/make_nano.h"
-#include "vdb/stream_archive.h"
-#include "vdb/trees.h"
-#include "vdb/volume_to_tree.h"
+#include "vdb/files.h"
+#include "vdb/write_nvdb.h"
+#include "vdb/write_vdb.h"
 
 namespace esvr::vdb {
 namespace {
@@ -61,11 +63,23 @@ openvdb::FloatGrid::Ptr makeFloatGrid(VolumeGrid grid) {
   return openvdb::gridPtrCast<openvdb::FloatGrid>(makeOpenVdbGrid(grid, {.half = HalfMode::kOff}));
 }
 
-void writeOpenVdb(openvdb::FloatGrid& source, const VoxelPacking& packing, std::ostream& stream) {
+/// OpenVDB's own class File ignores the errors of the stream that it writes to. This class writes to a
+/// stream that throws.
+class StreamArchive : public openvdb::io::Archive {
+ public:
+  explicit StreamArchive(std::uint32_t flags) { setCompression(flags); }
+
+  void writeTo(std::ostream& stream, const openvdb::GridPtrVec& grids) const {
+    constexpr bool kSeekable = true;
+    Archive::write(stream, grids, kSeekable, openvdb::MetaMap());
+  }
+};
+
+void writePacked(openvdb::FloatGrid& source, const VoxelPacking& packing, std::ostream& stream) {
   const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(source.copyGrid());  // shares the tree
   grid->setSaveFloatAsHalf(packing.form == PackedForm::kOpenVdbHalf);
   if (packing.codec == PackedCodec::kZip) grid->setGridClass(openvdb::GRID_UNKNOWN);
-  StreamArchive(openVdbFlags(packing.codec)).writeTo(stream, {grid}, {});
+  StreamArchive(openVdbFlags(packing.codec)).writeTo(stream, {grid});
 }
 
 void writeNano(const openvdb::FloatGrid& source, const VoxelPacking& packing,
@@ -81,7 +95,7 @@ void writeForm(const openvdb::FloatGrid::Ptr& grid, const VoxelPacking& packing,
   if (isNanoVdb(packing.form))
     writeNano(*grid, packing, stream);
   else
-    writeOpenVdb(*grid, packing, stream);
+    writePacked(*grid, packing, stream);
   stream.close();
 }
 

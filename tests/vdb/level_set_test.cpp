@@ -20,7 +20,6 @@
 #include "esvr/grid_coding.h"
 #include "esvr/mesh_distance.h"
 #include "vdb/made_files.h"
-#include "vdb/test_files.h"
 
 namespace esvr {
 namespace {

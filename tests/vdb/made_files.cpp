@@ -1,7 +1,12 @@
 #include "vdb/made_files.h"
 
+#include <bit>
+#include <cmath>
 #include <fstream>
 #include <map>
+#include <stdexcept>
+
+#include "esvr/error.h"
 
 namespace esvr::test {
 
@@ -75,6 +80,40 @@ VolumeGrid gridOf(const std::string& name, const std::vector<VoxelValue>& voxels
   grid.descriptor.transform = uniformTransform(1.0);
   grid.volume = volumeOf(voxels, background);
   return grid;
+}
+
+void expectSameBits(const SparseVolume& actual, const SparseVolume& expected) {
+  EXPECT_EQ(actual.origin, expected.origin);
+  EXPECT_EQ(actual.background, expected.background);
+  ASSERT_EQ(actual.bricks, expected.bricks);
+  ASSERT_EQ(actual.active, expected.active);
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < expected.values.size(); ++i)
+    different += std::bit_cast<std::uint32_t>(actual.values[i]) !=
+                 std::bit_cast<std::uint32_t>(expected.values[i]);
+  EXPECT_EQ(different, 0u) << "values that differ";
+}
+
+void expectSame(const VolumeGrid& actual, const VolumeGrid& expected) {
+  EXPECT_EQ(actual.descriptor, expected.descriptor);
+  expectSameBits(actual.volume, expected.volume);
+}
+
+bool readable(const std::filesystem::path& path, const ReadOptions& options) {
+  try {
+    for (const auto& listed : inspectVdb(path).grids) {
+      if (!listed.skipReason.empty()) continue;
+      const auto grid = readGrid(path, listed.uniqueName, options);
+      checkInvariants(grid.volume);
+      for (const float value : grid.volume.values)
+        if (!std::isfinite(value)) throw std::logic_error("a value that is not finite");
+    }
+  } catch (const BadInput&) {
+    return false;
+  } catch (const MemoryExceeded&) {
+    return false;
+  }
+  return true;
 }
 
 }  // namespace esvr::test

@@ -1,15 +1,22 @@
 #pragma once
-/// Makes files with OpenVDB itself, so that the reader is tested with files of another writer.
+/// Makes files with OpenVDB itself, so that the reader is tested with files of another writer, and
+/// compares volumes and grids bit by bit.
 
-#include "vdb/trees.h"
+#include <gtest/gtest.h>
+#include "vdb/open_vdb.h"
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "esvr/vdb_io.h"
+#include "support/temporary_folder.h"
 
 namespace esvr::test {
+
+/// The folder of the real volumes; empty if none is configured.
+inline std::filesystem::path dataDir() { return ESVR_DATA_DIR; }
 
 /// A float grid with one leaf of three active voxels, named "density".
 openvdb::FloatGrid::Ptr smallGrid(float background = 0.0f);
@@ -49,4 +56,16 @@ SparseVolume volumeOf(const std::vector<VoxelValue>& voxels, float background = 
 VolumeGrid gridOf(const std::string& name, const std::vector<VoxelValue>& voxels,
                   float background = 0.0f);
 
+// Fail unless the bits are the same.
+void expectSameBits(const SparseVolume& actual, const SparseVolume& expected);
+void expectSame(const VolumeGrid& actual, const VolumeGrid& expected);
+
+/// Reads all grids of a file; they must be sound and finite.
+/// \return false where the file is refused, or where it takes more memory than allowed
+bool readable(const std::filesystem::path& path, const ReadOptions& options);
+
 }  // namespace esvr::test
+
+#define ESVR_NEEDS_DATA()            \
+  if (esvr::test::dataDir().empty()) \
+  GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>"

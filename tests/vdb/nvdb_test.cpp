@@ -10,13 +10,9 @@
 #include <cstring>
 
 #include "esvr/error.h"
-#include "vdb/empty_grid.h"
-#include "vdb/expect_same.h"
+#include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"
-#include "vdb/nano_files.h"
-#include "vdb/nano_io.h"
-#include "vdb/readable.h"
-#include "vdb/test_files.h"
+#include "vdb/write_nvdb.h"
 
 namespace esvr {
 namespace {

@@ -7,8 +7,7 @@
 
 #include "esvr/error.h"
 #include "esvr/vdb_io.h"
-#include "vdb/expect_same.h"
-#include "vdb/test_files.h"
+#include "vdb/made_files.h"
 
 namespace esvr {
 namespace {

@@ -1,9 +1,11 @@
-#include "vdb/transform.h"
+#include "vdb/properties.h"
 
 #include <openvdb/math/Maps.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <span>
+#include <map>
 #include <sstream>
 
 #include "esvr/error.h"
@@ -13,6 +15,25 @@ namespace esvr::vdb {
 namespace {
 
 namespace math = openvdb::math;
+
+/// OpenVDB's object for an item. It has its type if OpenVDB knows the type and the number of bytes
+/// is right, so that applications can access it; otherwise it holds the bytes unchanged.
+openvdb::Metadata::Ptr makeMetadata(const MetaItem& item) {
+  if (openvdb::Metadata::isRegisteredType(item.type)) {
+    auto typed = openvdb::Metadata::createMetadata(item.type);
+    // Metadata::read expects the size in front of the bytes.
+    const auto size = std::uint32_t(item.value.size());
+    std::string bytes(reinterpret_cast<const char*>(&size), sizeof size);
+    bytes.append(reinterpret_cast<const char*>(item.value.data()), item.value.size());
+    std::istringstream stream(bytes, std::ios::binary);
+    typed->read(stream);
+    if (stream && typed->size() == item.value.size()) return typed;
+  }
+  auto raw = std::make_shared<openvdb::UnknownMetadata>(item.type);
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(item.value.data());
+  raw->setValue({bytes, bytes + item.value.size()});
+  return raw;
+}
 
 /// The bytes of a frustum before the name of its second map: a box, a taper and a depth.
 constexpr std::uint64_t kFrustumHead = 8 * sizeof(double);
@@ -37,23 +58,61 @@ void checkFrustum(InputFile& file) {
   file.seek(start);
 }
 
-std::vector<std::byte> serialised(const math::MapBase& map) {
+/// The map with its bytes and, where it is linear, its matrix.
+Transform fromMap(const math::MapBase& map) {
   std::ostringstream stream(std::ios::binary);
   map.write(stream);
   const std::string text = stream.str();
   const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
-  return {bytes, bytes + text.size()};
-}
-
-std::optional<std::array<double, 16>> affineOf(const math::MapBase& map) {
-  if (!map.isLinear()) return std::nullopt;
-  const math::Mat4d matrix = map.getAffineMap()->getMat4();
-  std::array<double, 16> affine;
-  std::copy_n(matrix.asPointer(), affine.size(), affine.begin());
-  return affine;
+  Transform transform{map.type(), {bytes, bytes + text.size()}, std::nullopt};
+  if (map.isLinear()) {
+    const math::Mat4d matrix = map.getAffineMap()->getMat4();
+    std::copy_n(matrix.asPointer(), 16, transform.affine.emplace().begin());
+  }
+  return transform;
 }
 
 }  // namespace
+
+std::vector<MetaItem> readMetadata(InputFile& file) {
+  std::map<std::string, MetaItem> byName;
+  const auto count = file.read<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    MetaItem item;
+    item.name = file.readString();
+    item.type = file.readString();
+    item.value = file.readBytes(file.read<std::uint32_t>());
+    if (item.name.empty()) throw BadInput("is damaged: a metadata item without a name");
+    const bool isTemporary = item.type.starts_with("__");
+    if (!isTemporary) byName.insert_or_assign(item.name, std::move(item));
+  }
+  std::vector<MetaItem> items;
+  for (auto& [name, item] : byName) items.push_back(std::move(item));
+  return items;
+}
+
+const MetaItem* findItem(std::span<const MetaItem> items, const std::string& name) {
+  const auto item = std::ranges::find(items, name, &MetaItem::name);
+  return item == items.end() ? nullptr : &*item;
+}
+
+std::vector<MetaItem> withoutFileStatistics(std::vector<MetaItem> items) {
+  using openvdb::GridBase;
+  const std::array names{GridBase::META_FILE_BBOX_MIN,    GridBase::META_FILE_BBOX_MAX,
+                         GridBase::META_FILE_COMPRESSION, GridBase::META_FILE_MEM_BYTES,
+                         GridBase::META_FILE_VOXEL_COUNT, GridBase::META_FILE_DELAYED_LOAD};
+  std::erase_if(items, [&](const MetaItem& item) {
+    return std::ranges::find(names, item.name) != names.end();
+  });
+  return items;
+}
+
+void insertItems(std::span<const MetaItem> items, openvdb::MetaMap& to) {
+  for (const auto& item : items) {
+    to.removeMeta(item.name);
+    to.insertMeta(item.name, *makeMetadata(item));
+  }
+}
 
 Transform readTransform(InputFile& file) {
   const std::string mapType = file.readString();
@@ -63,8 +122,6 @@ Transform readTransform(InputFile& file) {
   file.followStream();
   return fromMap(*map);
 }
-
-Transform fromMap(const math::MapBase& map) { return {map.type(), serialised(map), affineOf(map)}; }
 
 Transform fromMatrix(const math::Mat4d& matrix) {
   const math::AffineMap affine(matrix);
@@ -102,6 +159,17 @@ math::Transform::Ptr toOpenVdb(const Transform& transform) {
 }  // namespace esvr::vdb
 
 namespace esvr {
+
+MetaItem stringItem(const std::string& name, const std::string& value) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(value.data());
+  return {name, "string", {bytes, bytes + value.size()}};
+}
+
+std::string stringValue(std::span<const MetaItem> items, const std::string& name) {
+  const MetaItem* item = vdb::findItem(items, name);
+  if (!item || item->type != "string") return {};
+  return {reinterpret_cast<const char*>(item->value.data()), item->value.size()};
+}
 
 Transform uniformTransform(double voxelSize) {
   if (!(voxelSize > 0.0) || !std::isfinite(voxelSize))

@@ -1,12 +1,15 @@
-#include "vdb/input_file.h"
+#include "vdb/files.h"
 
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <ios>
+#include <new>
+#include <stdexcept>
+#include <streambuf>
 #include <system_error>
 
 #include "esvr/error.h"
-#include "vdb/memory_buffer.h"
 
 namespace esvr::vdb {
 namespace {
@@ -25,6 +28,57 @@ std::uint64_t sizeOfRegularFile(const std::filesystem::path& path) {
   if (error) throw BadInput(error.message());
   if (size == 0) throw BadInput("is empty");
   return size;
+}
+
+/// Bytes in memory as a source of a stream. They must outlive the buffer, and are only read.
+class MemoryBuffer : public std::streambuf {
+ public:
+  explicit MemoryBuffer(std::span<const std::byte> bytes) {
+    auto* first = const_cast<char*>(reinterpret_cast<const char*>(bytes.data()));
+    setg(first, first, first + bytes.size());
+  }
+
+ protected:
+  pos_type seekpos(pos_type position, std::ios_base::openmode /*which*/) override {
+    if (position < 0 || position > egptr() - eback()) return pos_type(off_type(-1));
+    setg(eback(), eback() + off_type(position), egptr());
+    return position;
+  }
+
+  pos_type seekoff(off_type offset, std::ios_base::seekdir from,
+                   std::ios_base::openmode which) override {
+    if (from == std::ios_base::cur) offset += gptr() - eback();
+    if (from == std::ios_base::end) offset += egptr() - eback();
+    return seekpos(offset, which);
+  }
+};
+
+/// Rethrows errors that mean the same in reading and writing.
+void rethrowCommon(const std::string& where) {
+  try {
+    throw;
+  } catch (const Cancelled&) {
+    throw;
+  } catch (const NotFinite& e) {
+    throw NotFinite(where + e.what());
+  } catch (const CannotConvert& e) {
+    throw CannotConvert(where + e.what());
+  } catch (const BadInput& e) {
+    throw BadInput(where + e.what());
+  } catch (const UsageError& e) {
+    throw UsageError(where + e.what());
+  } catch (const MemoryExceeded& e) {
+    throw MemoryExceeded(where + e.what());
+  } catch (const RuntimeFailure& e) {
+    throw RuntimeFailure(where + e.what());
+  } catch (const Error& e) {
+    throw Error(e.kind(), where + e.what());
+  } catch (const std::bad_alloc&) {
+    throw RuntimeFailure(where + "out of memory");
+  } catch (const std::logic_error&) {
+    throw;  // an error of this library, which must not look like an error of the file
+  } catch (...) {
+  }
 }
 
 }  // namespace
@@ -109,6 +163,28 @@ std::string InputFile::readString() {
 void InputFile::followStream() {
   position_ = std::uint64_t(stream_->tellg());
   need(0);
+}
+
+void rethrowWhileReading(const std::string& where) {
+  rethrowCommon(where);
+  try {
+    throw;
+  } catch (const std::ios_base::failure&) {
+    throw BadInput(where + "is truncated or cannot be read");
+  } catch (const std::exception& e) {
+    throw BadInput(where + e.what());
+  }
+}
+
+void rethrowWhileWriting(const std::string& where) {
+  rethrowCommon(where);
+  try {
+    throw;
+  } catch (const std::ios_base::failure&) {
+    throw RuntimeFailure(where + "cannot be written: the disk is full or failing");
+  } catch (const std::exception& e) {
+    throw RuntimeFailure(where + e.what());
+  }
 }
 
 }  // namespace esvr::vdb

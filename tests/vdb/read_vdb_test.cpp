@@ -1,28 +1,39 @@
-/// Plan: trees made with OpenVDB are read, and their values are compared exactly: leaves with every
-/// packing, tiles of every level, inactive voxels with any content, level sets, values that float
-/// cannot hold, and coordinates at both ends of the index space.
+// Plan: trees made with OpenVDB are read, and their values are compared exactly: leaves with every packing,
+// tiles of every level, inactive voxels with any content, level sets, values that float cannot hold, and
+// coordinates at both ends of the index space.
+//
+// The name that a user gives finds the right grid, also for empty names, shared names and names that look
+// like numbered ones. Grids that cannot be fitted are listed by name and type.
+//
+// Grids of vectors that OpenVDB wrote (floats, doubles, halves, with tiles and a background) are read by
+// components, and written so that OpenVDB reads the same vectors. Values that are not finite are refused with
+// the component and the voxel. Grids that are not of vectors, are empty or are level sets are refused.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
+#include <algorithm>
+#include <cstring>
 #include <limits>
 #include <thread>
 
 #include "esvr/error.h"
 #include "esvr/memory_limit.h"
 #include "support/non_finite.h"
-#include "vdb/expect_same.h"
+#include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"
-#include "vdb/test_files.h"
 
 namespace esvr {
 namespace {
 
 using openvdb::FloatGrid;
+using openvdb::Vec3DGrid;
+using openvdb::Vec3SGrid;
 using test::kInf;
 using test::kNan;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
@@ -367,6 +378,305 @@ TEST_F(Voxels, ReadFromManyThreadsAtOnce) {
     for (auto& grid : grids) threads.emplace_back([&] { grid = readGrid(path(), "density"); });
   }
   for (const auto& grid : grids) test::expectSame(grid, expected);
+}
+
+/// Grids with these names. The voxel (0, 0, 0) of the first one holds 1, of the second one 2, ...
+openvdb::GridPtrVec gridsNamed(const std::vector<std::string>& names) {
+  openvdb::GridPtrVec grids;
+  for (const auto& name : names) {
+    auto grid = test::smallGrid();
+    grid->setName(name);
+    grid->tree().setValue({0, 0, 0}, float(grids.size() + 1));
+    grids.push_back(grid);
+  }
+  return grids;
+}
+
+/// Names of grids in a file and their unique names.
+struct Order {
+  std::vector<std::string> names, unique;
+};
+
+class Names : public testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path() const { return directory_ / "in.vdb"; }
+  [[nodiscard]] std::vector<std::string> uniqueNames() const {
+    std::vector<std::string> names;
+    for (const auto& grid : inspectVdb(path()).grids) names.push_back(grid.uniqueName);
+    return names;
+  }
+  [[nodiscard]] float mark(const std::string& name) const {
+    return valueAt(readGrid(path(), name).volume, {0, 0, 0});
+  }
+  test::TemporaryFolder directory_;
+};
+
+TEST_F(Names, StandInFileOrder) {
+  test::save(path(), gridsNamed({"zebra", "ant", "mole"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("zebra", "ant", "mole"));
+  EXPECT_EQ(mark("ant"), 2.0f);
+}
+
+TEST_F(Names, SharedByGridsAreNumberedFromZero) {
+  test::save(path(), gridsNamed({"a", "b", "a", "a"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("a[0]", "b", "a[1]", "a[2]"));
+  EXPECT_THAT([&] { (void)mark("a"); }, ThrowsMessage<BadInput>(HasSubstr("has 3 grids \"a\"")));
+  EXPECT_EQ(mark("a[0]"), 1.0f);
+  EXPECT_EQ(mark("a[1]"), 3.0f);
+  EXPECT_EQ(mark("a[2]"), 4.0f);
+  EXPECT_EQ(mark("b[0]"), 2.0f);
+}
+
+TEST_F(Names, MayBeEmpty) {
+  test::save(path(), gridsNamed({""}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("(unnamed)"));
+  EXPECT_EQ(mark(""), 1.0f);
+  EXPECT_EQ(mark("(unnamed)"), 1.0f);
+  test::save(path(), gridsNamed({"", "", "x"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("(unnamed)[0]", "(unnamed)[1]", "x"));
+  EXPECT_EQ(mark("[1]"), 2.0f);
+  EXPECT_EQ(readGrid(path(), "[1]").descriptor.name, "");
+}
+
+TEST_F(Names, MayLookNumbered) {
+  test::save(path(), gridsNamed({"a[1]", "b"}));
+  EXPECT_THAT(uniqueNames(), ElementsAre("a[1]", "b"));
+  EXPECT_EQ(mark("a[1]"), 1.0f);
+}
+
+/// OpenVDB's own look-up finds "a[1]" for the grid of this very name and for the second "a".
+TEST_F(Names, ThatLookNumberedWinAndNoGridIsTakenForAnother) {
+  const std::vector<Order> orders{{{"a", "a", "a[1]"}, {"a[0]", "a#2", "a[1]"}},
+                                  {{"a[0]", "a", "a"}, {"a[0]", "a#2", "a[1]"}}};
+  for (const auto& [names, unique] : orders) {
+    test::save(path(), gridsNamed(names));
+    EXPECT_EQ(uniqueNames(), unique);
+    for (std::size_t g = 0; g < unique.size(); ++g) {
+      EXPECT_EQ(mark(unique[g]), float(g + 1));
+      EXPECT_EQ(valueAt(readGrid(path(), g).volume, {0, 0, 0}), float(g + 1));
+    }
+  }
+}
+
+/// A written file has no grid that OpenVDB finds for the name of another.
+TEST_F(Names, OfWrittenGridsAreToldApartByOpenVdb) {
+  std::vector<VolumeGrid> grids;
+  for (const char* name : {"a", "a", "a[1]"})
+    grids.push_back(test::gridOf(name, {{{0, 0, 0}, float(grids.size() + 1)}}));
+  writeGrids(path(), {}, grids);
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    EXPECT_EQ(valueAt(readGrid(path(), g).volume, {0, 0, 0}), float(g + 1));
+  const auto found = openvdb::gridPtrCast<openvdb::FloatGrid>(test::load(path(), "a[1]"));
+  EXPECT_EQ(found->tree().getValue({0, 0, 0}), 3.0f);
+}
+
+TEST_F(Names, OfPlacesThatAreNotThereAreRefused) {
+  test::save(path(), gridsNamed({"a", "b"}));
+  EXPECT_THAT([&] { (void)readGrid(path(), std::size_t{2}); },
+              ThrowsMessage<BadInput>(HasSubstr("has no grid number 3, only 2 grids")));
+}
+
+TEST_F(Names, AreListedForAnUnknownName) {
+  test::save(path(), gridsNamed({"a", "b", "a"}));
+  for (const char* name : {"c", "a[2]", "b[1]", "", "A"})
+    EXPECT_THAT([&] { (void)readGrid(path(), name); },
+                ThrowsMessage<BadInput>(AllOf(HasSubstr("in.vdb"), HasSubstr(name),
+                                              HasSubstr("\"a[0]\", \"b\", \"a[1]\""))));
+}
+
+TEST_F(Names, OfAFileWithoutGridsAreNone) {
+  test::save(path(), {});
+  EXPECT_TRUE(inspectVdb(path()).grids.empty());
+  EXPECT_THAT([&] { (void)readGrid(path(), "a"); }, ThrowsMessage<BadInput>(HasSubstr("none")));
+}
+
+TEST_F(Names, OfGridsThatCannotBeFittedComeWithTheirType) {
+  openvdb::GridPtrVec grids;
+  for (const char* type : {"bool", "mask", "int32", "int64", "vec3i", "ptdataidx32"})
+    grids.push_back(test::emptyGrid(std::string("Tree_") + type + "_5_4_3", type));
+  grids.push_back(test::smallGrid());
+  test::save(path(), grids);
+  const auto listed = inspectVdb(path()).grids;
+  ASSERT_EQ(listed.size(), 7u);
+  EXPECT_THAT(listed[0].skipReason, HasSubstr("bool"));
+  EXPECT_THAT(listed[1].skipReason, HasSubstr("mask"));
+  EXPECT_THAT(listed[2].skipReason, HasSubstr("int32"));
+  EXPECT_THAT(listed[3].skipReason, HasSubstr("int64"));
+  EXPECT_THAT(listed[4].skipReason, HasSubstr("vec3i"));
+  EXPECT_THAT(listed[5].skipReason, HasSubstr("points"));
+  EXPECT_EQ(listed[6].skipReason, "");
+  EXPECT_THAT([&] { (void)readGrid(path(), "vec3i"); },
+              ThrowsMessage<BadInput>(HasSubstr("of type vec3i")));
+  EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
+}
+
+TEST_F(Names, OfTypesThatOpenVdbDoesNotKnowAreListedToo) {
+  // The tree has another shape, as in other programs' files: the type of the first grid is
+  // rewritten.
+  const auto other = test::smallGrid();
+  other->setName("other");
+  test::save(path(), {other, test::smallGrid()});
+  auto bytes = test::bytesOf(path());
+  const std::string known = "Tree_float_5_4_3", odd = "Tree_float_4_3_3";
+  const auto asByte = [](std::byte b, char c) { return b == std::byte(c); };
+  const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(), asByte);
+  ASSERT_NE(at, bytes.end());
+  std::memcpy(&*at, odd.data(), odd.size());
+  test::writeBytes(path(), bytes);
+  const auto listed = inspectVdb(path()).grids;
+  ASSERT_EQ(listed.size(), 2u);
+  EXPECT_EQ(listed[0].valueType, "float");
+  EXPECT_THAT(listed[0].skipReason, HasSubstr("Tree_float_4_3_3"));
+  EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
+}
+
+constexpr Coord kVoxel{-1, 2, 3};
+constexpr Coord kInTile{64, 8, 9};
+
+/// Vectors with a background, three active voxels and an active tile of 8^3.
+template <class Grid>
+typename Grid::Ptr windGrid() {
+  using Vector = typename Grid::ValueType;
+  openvdb::initialize();
+  auto grid = Grid::create(Vector(1, 2, -3));
+  grid->setName("wind");
+  grid->setGridClass(openvdb::GRID_STAGGERED);
+  grid->setVectorType(openvdb::VEC_CONTRAVARIANT_RELATIVE);
+  grid->insertMeta("note", openvdb::StringMetadata("of wind"));
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.5));
+  auto accessor = grid->getAccessor();
+  accessor.setValue({-1, 2, 3}, Vector(0.5, -8, 0));
+  accessor.setValue({-1, 2, 4}, Vector(0, 0, 0));
+  accessor.setValue({7, 0, 0}, Vector(1024, 0.25, -2));
+  accessor.addTile(1, {64, 8, 8}, Vector(4, 5, 6), true);
+  return grid;
+}
+
+template <class Grid>
+class VectorFile : public testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path path(const char* name) const { return folder_ / name; }
+  test::TemporaryFolder folder_;
+};
+using VectorGrids = testing::Types<Vec3SGrid, Vec3DGrid>;
+TYPED_TEST_SUITE(VectorFile, VectorGrids);
+
+TYPED_TEST(VectorFile, IsReadByComponents) {
+  test::save(this->path("in.vdb"), {windGrid<TypeParam>()});
+  const GridSummary summary = inspectVdb(this->path("in.vdb")).grids.front();
+  EXPECT_TRUE(summary.isVector);
+  EXPECT_FALSE(summary.isScalar);
+  const VectorGrid wind = readVector(this->path("in.vdb"), "wind");
+  EXPECT_THAT(wind.background, ElementsAre(1.0, 2.0, -3.0));
+  const auto& [x, y, z] = wind.components;
+  EXPECT_EQ(valueAt(x, kVoxel), 0.5f);
+  EXPECT_EQ(valueAt(y, kVoxel), -8.0f);
+  EXPECT_EQ(valueAt(z, kInTile), 6.0f);
+  EXPECT_EQ(activeVoxelCount(x), 3u + kBrickVoxels);
+  const VolumeGrid alone = readComponent(this->path("in.vdb"), "wind", 1);
+  EXPECT_EQ(alone.descriptor.name, "wind.y");
+  EXPECT_EQ(alone.volume.values, y.values);
+  EXPECT_TRUE(alone.descriptor.metadata.empty());
+}
+
+TYPED_TEST(VectorFile, IsWrittenAsItWasRead) {
+  for (const bool half : {false, true}) {
+    const auto source = windGrid<TypeParam>();
+    source->setSaveFloatAsHalf(half);
+    test::save(this->path("in.vdb"), {source});
+    const VectorGrid wind = readVector(this->path("in.vdb"), "wind");
+    const std::vector<GridToWrite> grids{&wind};
+    writeGrids(this->path("out.vdb"), {}, grids, {.overwrite = true});
+    const auto read = openvdb::gridPtrCast<TypeParam>(test::load(this->path("out.vdb"), "wind"));
+    ASSERT_TRUE(read);
+    EXPECT_TRUE(read->tree().hasSameTopology(source->tree()));
+    for (auto voxel = source->cbeginValueOn(); voxel; ++voxel)
+      EXPECT_EQ(read->tree().getValue(voxel.getCoord()), *voxel);
+    EXPECT_EQ(read->background(), source->background());
+    EXPECT_EQ(read->transform(), source->transform());
+    EXPECT_EQ(read->getGridClass(), openvdb::GRID_STAGGERED);
+    EXPECT_EQ(read->getVectorType(), openvdb::VEC_CONTRAVARIANT_RELATIVE);
+    EXPECT_EQ(read->template metaValue<std::string>("note"), "of wind");
+    EXPECT_EQ(read->saveFloatAsHalf(), half);
+  }
+}
+
+TYPED_TEST(VectorFile, WithANumberThatIsNotFiniteNamesComponentAndVoxel) {
+  const auto grid = windGrid<TypeParam>();
+  auto accessor = grid->getAccessor();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  accessor.setValue({5, 6, 7}, typename TypeParam::ValueType(0.0, nan, 0.0));
+  test::save(this->path("in.vdb"), {grid});
+  EXPECT_EQ(readComponent(this->path("in.vdb"), "wind", 0).nonFiniteReplaced, 0u);
+  EXPECT_THAT([&] { (void)readVector(this->path("in.vdb"), "wind"); },
+              ThrowsMessage<BadInput>(
+                  AllOf(HasSubstr("\"wind.y\""), HasSubstr("the first is at (5, 6, 7)"))));
+  const VectorGrid wind =
+      readVector(this->path("in.vdb"), "wind", {.nonFinite = NonFinite::kValue});
+  EXPECT_EQ(wind.nonFiniteReplaced, 1u);
+  EXPECT_EQ(valueAt(wind.components[1], {5, 6, 7}), 0.0f);
+}
+
+TYPED_TEST(VectorFile, IsReadFromItsCarriedBytes) {
+  test::save(this->path("in.vdb"), {windGrid<TypeParam>()});
+  const std::vector<std::size_t> places{0};
+  const CarriedGrid carried = readCarried(this->path("in.vdb"), places).front();
+  EXPECT_EQ(readVector(carried).components[2].values,
+            readVector(this->path("in.vdb"), "wind").components[2].values);
+}
+
+using OtherVectors = VectorFile<Vec3SGrid>;
+
+TEST_F(OtherVectors, ThatAreEmptyOrALevelSetAreNotRead) {
+  const auto level = windGrid<Vec3SGrid>();
+  level->setName("level");
+  level->setGridClass(openvdb::GRID_LEVEL_SET);
+  const auto empty = Vec3SGrid::create();
+  empty->setName("empty");
+  test::save(path("in.vdb"), {level, empty, test::smallGrid()});
+  const auto refused = [&](const char* name, const char* why) {
+    EXPECT_THAT([&] { (void)readComponent(path("in.vdb"), name, 0); },
+                ThrowsMessage<BadInput>(AllOf(HasSubstr(name), HasSubstr(why))));
+  };
+  refused("level", "a level set of vectors");
+  refused("empty", "no active voxel");
+  refused("density", "numbers, not vectors");
+  EXPECT_THAT([&] { (void)readGrid(path("in.vdb"), "level"); },
+              ThrowsMessage<BadInput>(HasSubstr("level set of vectors")));
+}
+
+TEST_F(OtherVectors, AreCountedWithoutStatistics) {
+  test::saveCompressed(path("in.vdb"), {windGrid<Vec3SGrid>()}, openvdb::io::COMPRESS_NONE);
+  openvdb::io::File file(path("plain.vdb").string());
+  file.setGridStatsMetadataEnabled(false);
+  file.write(openvdb::GridPtrVec{windGrid<Vec3SGrid>()});
+  for (const char* name : {"in.vdb", "plain.vdb"})
+    EXPECT_EQ(inspectVdb(path(name)).grids.front().activeVoxels, 3u + kBrickVoxels);
+}
+
+TEST_F(OtherVectors, BeyondHalfAreNotWrittenAsHalf) {
+  test::save(path("in.vdb"), {windGrid<Vec3SGrid>()});
+  VectorGrid wind = readVector(path("in.vdb"), "wind");
+  wind.components[2].brickValues(0)[voxelOffset(localOf(kVoxel))] = 1e6f;
+  const std::vector<GridToWrite> grids{&wind};
+  EXPECT_THAT([&] { writeGrids(path("out.vdb"), {}, grids, {.half = HalfMode::kOn}); },
+              ThrowsMessage<UsageError>(HasSubstr("65504")));
+}
+
+TEST_F(OtherVectors, AreNotWrittenToNanoVdb) {
+  test::save(path("in.vdb"), {windGrid<Vec3SGrid>()});
+  const VectorGrid wind = readVector(path("in.vdb"), "wind");
+  const std::vector<GridToWrite> grids{&wind};
+  EXPECT_THAT([&] { writeGrids(path("out.nvdb"), {}, grids); },
+              ThrowsMessage<UsageError>(AllOf(HasSubstr("wind"), HasSubstr("vectors"))));
+}
+
+TEST_F(OtherVectors, OfMoreMemoryThanAllowedAreRefused) {
+  test::save(path("in.vdb"), {windGrid<Vec3SGrid>()});
+  constexpr std::uint64_t kTwoComponents = 20'000;  // three bricks take 6 KB in each
+  EXPECT_NO_THROW((void)readComponent(path("in.vdb"), "wind", 0, {.maxBytes = kTwoComponents}));
+  EXPECT_THROW((void)readVector(path("in.vdb"), "wind", {.maxBytes = kTwoComponents / 2}),
+               MemoryExceeded);
 }
 
 }  // namespace

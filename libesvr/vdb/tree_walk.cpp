@@ -1,9 +1,6 @@
-#include "vdb/tree_survey.h"
-
-#include <array>
-#include <string_view>
-
 #include "vdb/tree_walk.h"
+
+#include <string_view>
 
 namespace esvr::vdb {
 namespace {
@@ -37,17 +34,6 @@ constexpr std::array kKnownTypes{
     KnownType{"ptidx32", 4, 1, false, kOther},
     KnownType{"ptdataidx32", 4, 1, false, kOther},
 };
-
-constexpr std::string_view kTreePrefix = "Tree_", kUsualNodes = "_5_4_3";
-
-const KnownType* knownType(std::string_view treeType) {
-  if (!treeType.starts_with(kTreePrefix) || !treeType.ends_with(kUsualNodes)) return nullptr;
-  treeType.remove_prefix(kTreePrefix.size());
-  treeType.remove_suffix(std::min(kUsualNodes.size(), treeType.size()));
-  for (const KnownType& type : kKnownTypes)
-    if (type.name == treeType) return &type;
-  return nullptr;
-}
 
 /// Bytes of a leaf of bits: its mask, its place and, unless the mask is the value, its values.
 constexpr std::uint64_t kMaskLeafBytes = sizeof(LeafMask) + sizeof(Coord);
@@ -98,8 +84,13 @@ class Surveyor {
 }  // namespace
 
 std::optional<ValueLayout> layoutOf(const StoredTree& tree) {
-  const KnownType* type = knownType(tree.treeType);
-  if (!type) return std::nullopt;
+  constexpr std::string_view kTreePrefix = "Tree_", kUsualNodes = "_5_4_3";
+  std::string_view name = tree.treeType;
+  if (!name.starts_with(kTreePrefix) || !name.ends_with(kUsualNodes)) return std::nullopt;
+  name.remove_prefix(kTreePrefix.size());
+  name.remove_suffix(std::min(kUsualNodes.size(), name.size()));
+  const auto* const type = std::ranges::find(kKnownTypes, name, &KnownType::name);
+  if (type == kKnownTypes.end()) return std::nullopt;
   constexpr std::uint64_t kHalfBytes = 2;
   ValueLayout layout{.valueBytes = type->numberBytes * type->numbers,
                      .halfBytes = type->numbers * kHalfBytes,

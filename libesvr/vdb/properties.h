@@ -1,5 +1,8 @@
 #pragma once
-/// VDB metadata as bytes: reads it with checked sizes, looks up items, and passes it to OpenVDB.
+/// The properties of files and grids that are kept as bytes: metadata and index-to-world maps. They
+/// are read with checked sizes, and passed to OpenVDB such that it writes the same bytes again.
+
+#include "vdb/open_vdb.h"
 
 #include <cstring>
 #include <optional>
@@ -9,10 +12,7 @@
 #include <vector>
 
 #include "esvr/grid_descriptor.h"
-#include "vdb/input_file.h"
-#include "vdb/versions.h"
-
-#include <openvdb/MetaMap.h>
+#include "vdb/files.h"
 
 namespace esvr::vdb {
 
@@ -33,11 +33,22 @@ std::optional<T> fixedValue(std::span<const MetaItem> items, const std::string& 
   return value;
 }
 
-/// True for statistics that a writer makes anew for each grid (file_voxel_count, ...).
-bool isFileStatistic(const MetaItem& item);
+/// The items without statistics that a writer makes anew for each grid (file_voxel_count, ...).
 std::vector<MetaItem> withoutFileStatistics(std::vector<MetaItem> items);
 
 /// Inserts items such that OpenVDB writes the same bytes again.
 void insertItems(std::span<const MetaItem> items, openvdb::MetaMap& to);
+
+/// Reads the transform at the position of the file. The stream must know the file's version.
+/// \throws BadInput  the transform is damaged, or OpenVDB does not know its map
+Transform readTransform(InputFile& file);
+
+/// The simplest of OpenVDB's maps that equals an affine map.
+/// \throws openvdb::ArithmeticError  the matrix is singular or not affine
+Transform fromMatrix(const openvdb::math::Mat4d& matrix);
+
+/// The map as it was read, without OpenVDB's simplification.
+/// \throws BadInput  the bytes are not such a map
+openvdb::math::Transform::Ptr toOpenVdb(const Transform& transform);
 
 }  // namespace esvr::vdb

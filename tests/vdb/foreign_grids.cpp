@@ -1,7 +1,7 @@
-#include "vdb/nano_files.h"
+#include "vdb/foreign_grids.h"
 
-#include "vdb/make_nano.h"
-#include "vdb/trees.h"
+#include "vdb/open_vdb.h"
+#include "vdb/write_nvdb.h"
 
 #include ESVR_NANOVDB_CREATE
 
@@ -28,17 +28,22 @@ vdb::NanoHandle vectors(const openvdb::Vec3SGrid& grid) {
 #endif
 }
 
-vdb::NanoHandle handleOf(const openvdb::GridBase& grid) {
-  return grid.isType<openvdb::Vec3SGrid>() ? vectors(static_cast<const openvdb::Vec3SGrid&>(grid))
-                                           : vdb::makeNano(grid);
-}
-
 }  // namespace
+
+openvdb::GridBase::Ptr emptyGrid(const std::string& treeType, const std::string& name) {
+  openvdb::initialize();
+  auto grid = openvdb::GridBase::createGrid(treeType);
+  grid->setName(name);
+  return grid;
+}
 
 void saveNano(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
               NanoCodec codec) {
   std::vector<vdb::NanoHandle> handles;
-  for (const auto& grid : grids) handles.push_back(handleOf(*grid));
+  for (const auto& grid : grids) {
+    const auto wind = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
+    handles.push_back(wind ? vectors(*wind) : vdb::makeNano(*grid));
+  }
   nanovdb::io::writeGrids(path.string(), handles, codecOf(codec));
 }
 

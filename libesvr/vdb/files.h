@@ -1,7 +1,8 @@
 #pragma once
-/// A file that is read from front to back. Every size is checked before it is used, so that nothing
-/// is allocated or skipped beyond the end of the file. Errors are BadInput without the file's name,
-/// which the callers add (errors.h).
+/// An input file of which every size is checked before it is used, so that nothing is allocated or
+/// skipped beyond its end, and errors of OpenVDB, NanoVDB and the streams as errors of this library.
+/// Functions of this folder throw errors without the name of the file. Their callers add it, and the
+/// name of the grid.
 
 #include <cstddef>
 #include <cstdint>
@@ -11,10 +12,14 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
+
+#include "esvr/grid_names.h"
 
 namespace esvr::vdb {
 
+/// A file that is read from front to back. Its own errors are BadInput.
 class InputFile {
  public:
   /// \throws BadInput  the file is missing, a directory or another special file, empty, or not
@@ -76,5 +81,48 @@ class InputFile {
   std::uint64_t end_ = 0;  ///< at most size_
   std::uint64_t position_ = 0;
 };
+
+/// Rethrows the current exception as an esvr::Error whose text begins with `where`. The library's
+/// own errors keep their type; exceptions of the VDB libraries become BadInput.
+[[noreturn]] void rethrowWhileReading(const std::string& where);
+/// The same for writing, where exceptions of the VDB libraries become RuntimeFailure.
+[[noreturn]] void rethrowWhileWriting(const std::string& where);
+
+/// Runs `body` and adds `path` to the text of its errors.
+template <class Body>
+decltype(auto) whileReading(const std::filesystem::path& path, Body&& body) {
+  try {
+    return std::forward<Body>(body)();
+  } catch (...) {
+    rethrowWhileReading(path.string() + ": ");
+  }
+}
+
+/// Runs `body` and adds the name of a grid to the text of its errors. It is used inside
+/// whileReading.
+/// \param nameOf  gives the name as users see it; it is called if there is an error
+template <class NameOf, class Body>
+decltype(auto) inNamedGrid(const NameOf& nameOf, Body&& body) {
+  try {
+    return std::forward<Body>(body)();
+  } catch (...) {
+    rethrowWhileReading("grid \"" + nameOf() + "\": ");
+  }
+}
+
+/// The same for a name from a file.
+template <class Body>
+decltype(auto) inGrid(const std::string& name, Body&& body) {
+  return inNamedGrid([&] { return shownName(name); }, std::forward<Body>(body));
+}
+
+template <class Body>
+decltype(auto) whileWriting(const std::filesystem::path& path, Body&& body) {
+  try {
+    return std::forward<Body>(body)();
+  } catch (...) {
+    rethrowWhileWriting(path.string() + ": ");
+  }
+}
 
 }  // namespace esvr::vdb
