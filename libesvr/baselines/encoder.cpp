@@ -13,7 +13,7 @@
 #include "core/add_seconds.h"
 #include "esvr/baseline.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr {
 namespace {

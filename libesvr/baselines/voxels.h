@@ -8,9 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
 #include "esvr/vdb_io.h"
+#include "esvr/volume.h"
 
 namespace esvr::baselines {
 

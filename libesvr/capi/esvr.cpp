@@ -16,9 +16,9 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/voxel_rule.h"
 
 // Failures become statuses and a text

@@ -8,7 +8,7 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/esvr.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 struct esvr_file {
   esvr::EsvrFile content;

@@ -10,7 +10,7 @@
 #include <new>
 
 #include "esvr/error.h"
-#include "esvr/voxel_memory.h"
+#include "esvr/volume.h"
 #include "format/carried_bytes.h"
 #include "format/checksum.h"
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "esvr/error.h"
-#include "esvr/ranks.h"
+#include "esvr/workers.h"
 
 namespace esvr {
 namespace {

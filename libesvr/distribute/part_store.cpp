@@ -1,4 +1,4 @@
-#include "esvr/part_store.h"
+#include "esvr/workers.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -17,8 +17,8 @@
 
 #include "core/atomic_file.h"
 #include "core/publish_file.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
 
 namespace esvr {
 namespace {

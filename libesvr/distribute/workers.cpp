@@ -16,11 +16,9 @@
 #include <vector>
 
 #include "core/parse_text.h"
-#include "esvr/device_workers.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
-#include "esvr/rank_workers.h"
-#include "esvr/ranks.h"
+#include "esvr/workers.h"
 
 namespace esvr {
 namespace {

@@ -8,7 +8,7 @@
 #include <numeric>
 
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
 #include "vdb/properties.h"
 #include "vdb/tree_walk.h"

@@ -12,8 +12,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "esvr/carried_grid.h"
-#include "esvr/grid_descriptor.h"
+#include "esvr/grid.h"
 #include "vdb/files.h"
 
 namespace esvr::vdb {

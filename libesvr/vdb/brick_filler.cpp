@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "esvr/empty_signs.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/memory_limit.h"
+#include "esvr/volume.h"
 
 namespace esvr::vdb {
 namespace {

@@ -15,9 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
 #include "esvr/vdb_io.h"
+#include "esvr/volume.h"
 
 namespace esvr::vdb {
 

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr::vdb {
 

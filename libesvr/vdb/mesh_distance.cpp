@@ -1,4 +1,4 @@
-#include "esvr/mesh_distance.h"
+#include "esvr/vdb_io.h"
 
 #include "vdb/open_vdb.h"
 

@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "esvr/grid_descriptor.h"
+#include "esvr/grid.h"
 #include "vdb/files.h"
 
 namespace esvr::vdb {

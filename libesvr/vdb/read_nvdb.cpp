@@ -9,9 +9,9 @@
 #include <new>
 #include <type_traits>
 
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
-#include "esvr/memory_limit.h"
+#include "esvr/grid.h"
 #include "vdb/brick_filler.h"
 #include "vdb/properties.h"
 #include "vdb/write_nvdb.h"

@@ -13,9 +13,9 @@
 
 #include "core/memory_budget.h"
 #include "core/parallel.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
-#include "esvr/memory_limit.h"
+#include "esvr/grid.h"
 #include "vdb/archive.h"
 #include "vdb/brick_filler.h"
 #include "vdb/properties.h"

@@ -25,9 +25,8 @@
 #include <string>
 
 #include "core/parallel.h"
-#include "esvr/coord.h"
 #include "esvr/error.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "vdb/files.h"
 
 namespace esvr::vdb {

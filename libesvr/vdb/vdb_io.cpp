@@ -5,7 +5,7 @@
 #include "core/atomic_file.h"
 #include "core/read_input.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "vdb/archive.h"
 #include "vdb/files.h"
 #include "vdb/readers.h"

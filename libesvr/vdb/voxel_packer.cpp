@@ -1,4 +1,4 @@
-#include "esvr/voxel_packer.h"
+#include "esvr/vdb_io.h"
 
 #include "vdb/open_vdb.h"
 

@@ -8,7 +8,7 @@
 #include <type_traits>
 
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "vdb/write_vdb.h"
 
 #include ESVR_NANOVDB_CREATE

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <span>
 
-#include "esvr/nano_volume.h"
 #include "esvr/vdb_io.h"
 
 // The headers of NanoVDB's writers for `#include ESVR_NANOVDB_...`, their namespace, whether they

@@ -19,13 +19,9 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "esvr/carried_grid.h"
-#include "esvr/empty_signs.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
-#include "esvr/packed_grid.h"
-#include "esvr/sparse_volume.h"
-#include "esvr/vector_grid.h"
+#include "esvr/grid.h"
+#include "esvr/volume.h"
 #include "vdb/archive.h"
 #include "vdb/properties.h"
 
@@ -503,7 +499,8 @@ void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> f
   stream.exceptions(std::ios::badbit | std::ios::failbit);
   using namespace openvdb::io;
   const std::uint32_t compression =
-      COMPRESS_ACTIVE_MASK | (openvdb::io::Archive::hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP);
+      COMPRESS_ACTIVE_MASK |
+      (openvdb::io::Archive::hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP);
   ArchiveWriter writer(stream, compression, metadata, std::move(names));
   for (const auto& grid : grids)
     std::visit(

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/part_runner.h"
+#include "esvr/fit.h"
 
 namespace esvr::test {
 

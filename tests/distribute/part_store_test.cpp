@@ -1,7 +1,7 @@
 // Plan: a store gives back what was put, also to a later process. It refuses damaged results, another
 // origin, and a process that wants it while another one uses it.
 
-#include "esvr/part_store.h"
+#include "esvr/workers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

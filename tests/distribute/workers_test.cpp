@@ -16,9 +16,8 @@
 #include <vector>
 
 #include "distribute/fake_parts.h"
-#include "esvr/device_workers.h"
 #include "esvr/error.h"
-#include "esvr/rank_workers.h"
+#include "esvr/workers.h"
 #include "support/temporary_folder.h"
 
 namespace esvr {

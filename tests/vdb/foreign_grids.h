@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "esvr/carried_grid.h"
-#include "esvr/nano_volume.h"
+#include "esvr/grid.h"
+#include "esvr/vdb_io.h"
 
 namespace esvr::test {
 

@@ -16,9 +16,9 @@
 #include <limits>
 
 #include "esvr/convert.h"
-#include "esvr/empty_signs.h"
 #include "esvr/grid_coding.h"
-#include "esvr/mesh_distance.h"
+#include "esvr/vdb_io.h"
+#include "esvr/volume.h"
 #include "vdb/made_files.h"
 
 namespace esvr {

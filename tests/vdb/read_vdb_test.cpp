@@ -18,8 +18,8 @@
 #include <limits>
 #include <thread>
 
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/memory_limit.h"
 #include "support/non_finite.h"
 #include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"

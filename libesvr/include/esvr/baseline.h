@@ -9,10 +9,9 @@
 #include <variant>
 #include <vector>
 
-#include "esvr/coord.h"
-#include "esvr/progress.h"
+#include "esvr/device.h"
 #include "esvr/vdb_io.h"
-#include "esvr/voxel_packer.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

@@ -7,7 +7,7 @@
 #include <array>
 #include <optional>
 
-#include "esvr/coord.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

@@ -1,18 +1,20 @@
 #pragma once
-/// Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
-/// quantised, and their intensities are solved for again.
+/// Makes stored grids smaller: quantises their ellipsoids, leaves the less important ones out, and corrects signs.
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
 #include "esvr/container.h"
-#include "esvr/coord.h"
 #include "esvr/device.h"
 #include "esvr/grid_coding.h"
 #include "esvr/quantised.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
+
+// Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
+// quantised, and their intensities are solved for again.
 
 struct CompactOptions {
   /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32. With
@@ -52,5 +54,26 @@ struct CompactResult {
 /// \throws DeviceError  the GPU cannot be used
 [[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                                         const CompactOptions& options = {});
+
+// Coarser levels of detail of a grid: the most important of its ellipsoids.
+
+/// Keeps the first importance layers of a grid and drops its residual. A grid that has no more
+/// layers is returned unchanged.
+[[nodiscard]] StoredGrid firstLayers(StoredGrid grid, std::size_t layers);
+
+/// Keeps the `count` ellipsoids of the largest weight of a grid, in their order. The weight is
+/// |I| sqrt(s1 s2 s3): the root of the ellipsoid's sum of squares over voxels, up to a factor that
+/// depends on kappa only. The result has no quantised form, no layers and no residual. A grid that
+/// has no more ellipsoids is returned unchanged.
+[[nodiscard]] StoredGrid heaviest(StoredGrid grid, std::size_t count);
+
+// A residual corrects the sum of ellipsoids voxel by voxel where its sign is wrong.
+
+/// Corrects the sign of every voxel of a narrow band where the sum has another one than the source,
+/// by a residual. A reader on any machine then finds the signs of the source: evaluations on different
+/// machines differ by rounding (field.h), and the residual includes a margin for that.
+/// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
+/// \return the grid without a residual if no sign is wrong
+[[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
 
 }  // namespace esvr

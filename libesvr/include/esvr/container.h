@@ -9,17 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "esvr/block_levels.h"
-#include "esvr/carried_grid.h"
-#include "esvr/coord.h"
+#include "esvr/device.h"
 #include "esvr/ellipsoids.h"
-#include "esvr/fit_record.h"
-#include "esvr/grid_descriptor.h"
-#include "esvr/memory_limit.h"
+#include "esvr/grid.h"
 #include "esvr/quantised.h"
-#include "esvr/sparse_volume.h"
-#include "esvr/vector_grid.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 
@@ -68,7 +62,7 @@ struct StoredGrid {
   std::vector<Coord> bricks;
   std::vector<BrickMask> mask;      ///< active voxels of each brick, for kMask; else empty
   std::vector<BlockLevels> levels;  ///< levels of each brick, for kBlocks; else empty
-  /// The background of the source is far from its values (spanOf, sparse_volume.h). The background of
+  /// The background of the source is far from its values (spanOf, volume.h). The background of
   /// `field` and of `voxels` then is a value among the active ones, to which these are relative, and
   /// decoded inactive voxels get the background of `descriptor`. Only with kMask or with voxels.
   bool farBackground = false;
@@ -159,7 +153,7 @@ struct GridOfFile {
 /// The names of all grids in the order of the file.
 [[nodiscard]] std::vector<std::string> namesInOrder(const EsvrFile& file);
 
-/// The names by which users find each of EsvrFile::grids: GridNames::unique (grid_names.h), and for
+/// The names by which users find each of EsvrFile::grids: GridNames::unique (grid.h), and for
 /// components of vectors GridNames::ofComponent. They are the same as in the .vdb file that the file comes
 /// from, if it has all grids of it.
 [[nodiscard]] std::vector<std::string> namesOfStored(const EsvrFile& file);
@@ -291,7 +285,7 @@ struct EsvrSummary {
 /// Reads the header and the section table of a file.
 /// \throws BadInput  as for readEsvr
 [[nodiscard]] EsvrSummary inspectEsvr(const std::filesystem::path& path);
-/// The same for a file or a frame (frame_coding.h) in memory.
+/// The same for a file or a frame (grid_coding.h) in memory.
 /// \param nameForErrors  its name in error texts
 [[nodiscard]] EsvrSummary inspectEsvr(std::span<const std::byte> bytes,
                                       const std::string& nameForErrors);

@@ -5,18 +5,19 @@
 /// goal.
 
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <variant>
 
 #include "esvr/compact.h"
 #include "esvr/container.h"
 #include "esvr/fit.h"
-#include "esvr/grid_descriptor.h"
+#include "esvr/grid.h"
 #include "esvr/paper_method.h"
-#include "esvr/simplified_mask.h"
-#include "esvr/sparse_volume.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 
@@ -99,7 +100,7 @@ struct ConvertOptions {
   StorageOptions storage;
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
-  /// Another grid that this one refers to in its file may take its place (voxel_reference.h).
+  /// Another grid that this one refers to in its file may take its place.
   /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal and a PsnrGoal, so that
   /// only the first frame of a group takes the time of a fit.
   const StoredGrid* previous = nullptr;
@@ -186,7 +187,7 @@ struct Conversion {
 ///                     doubles; a SizeGoal is combined with kFloat32; the goal and the
 ///                     representation or the storage exclude each other; a SizeGoal is too small for
 ///                     the ellipsoids of a narrow band and the residual of their signs
-/// A volume whose background is far from its values (spanOf, sparse_volume.h) is converted relative
+/// A volume whose background is far from its values (spanOf, volume.h) is converted relative
 /// to a value among them, with its exact mask whatever StorageOptions::activity says, unless the goal
 /// is lossless (StoredGrid::farBackground).
 /// Values that differ from the background by more than 2^120 (1.3e36) are too large for sums in
@@ -211,5 +212,23 @@ struct PaperConversion {
 [[nodiscard]] PaperConversion convertByPaper(const ConvertInput& input,
                                              const PaperFitOptions& options,
                                              const StorageOptions& storage);
+
+// Chooses the grids of a file whose voxels are the context of other grids' voxels (VoxelReference),
+// so that they take fewer bytes.
+
+/// Chooses a reference for a grid of voxels. Candidates are compared on a sample of its bricks.
+/// \param grids  the grids of a file. Those of `candidates` must be before `grid`, and those among
+///               them that hold no voxels are ignored.
+/// \return the reference with which the voxels take the fewest bytes of those that were tried, the
+///         empty one among them. They may take even fewer without a reference (bytesAdded).
+[[nodiscard]] VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
+                                             std::span<const std::size_t> candidates);
+
+/// The grid that a reference names, with the values that are expected for the grid that refers to
+/// it. As ConvertOptions::previous it makes a conversion choose voxels that take few bytes with this
+/// reference.
+/// \param grid  refers to the other grid
+[[nodiscard]] StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
+                                      const VoxelReference& reference);
 
 }  // namespace esvr

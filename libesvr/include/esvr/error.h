@@ -37,7 +37,7 @@ struct BadInput : Error {
   explicit BadInput(const std::string& what) : Error(ErrorKind::kBadInput, what) {}
 };
 /// Input that is sound, but that a conversion cannot represent, such as voxels that are 2^31 apart. A
-/// .vdb grid of this kind can still be carried unchanged (carried_grid.h).
+/// .vdb grid of this kind can still be carried unchanged (grid.h).
 struct CannotConvert : BadInput {
   explicit CannotConvert(const std::string& what) : BadInput(what) {}
 };
@@ -55,7 +55,7 @@ struct DeviceError : Error {
 struct MemoryExceeded : Error {
   explicit MemoryExceeded(const std::string& what) : Error(ErrorKind::kDevice, what) {}
 };
-/// A CancelToken (progress.h) was set, and there is no partial result to return.
+/// A CancelToken (device.h) was set, and there is no partial result to return.
 struct Cancelled : Error {
   Cancelled() : Error(ErrorKind::kRuntime, "cancelled") {}
 };

@@ -1,6 +1,7 @@
 #pragma once
 /// Fits ellipsoids to a sparse volume.
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -8,15 +9,43 @@
 #include <string>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "esvr/device.h"
 #include "esvr/ellipsoids.h"
-#include "esvr/fit_record.h"
-#include "esvr/part_runner.h"
-#include "esvr/progress.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
+
+// Where the parts of a fit in chunks are run. A part is the fit of one chunk in one round
+// (docs/scale.md).
+
+/// A hash of everything that the result of a part depends on.
+using PartKey = std::array<std::uint64_t, 2>;
+
+/// The result of a part.
+struct PartOutput {
+  std::vector<std::byte> bytes;
+  bool complete = true;  ///< false if the fit was cancelled: another run must not use the result
+};
+
+/// The parts of a round. They do not depend on each other. All functions may be called on several
+/// threads at the same time.
+class RoundParts {
+ public:
+  virtual ~RoundParts() = default;
+  [[nodiscard]] virtual int round() const = 0;  ///< number of the round, from 0
+  [[nodiscard]] virtual std::size_t count() const = 0;
+  [[nodiscard]] virtual PartKey keyOf(std::size_t part) const = 0;
+  /// Fits a part. After a cancellation it returns at once.
+  [[nodiscard]] virtual PartOutput fit(std::size_t part, const Device& device) const = 0;
+};
+
+/// Runs the parts of a round. The result does not depend on the implementation.
+class PartRunner {
+ public:
+  virtual ~PartRunner() = default;
+  /// \return PartOutput::bytes of every part, in order
+  [[nodiscard]] virtual std::vector<std::vector<std::byte>> run(const RoundParts& parts) = 0;
+};
 
 /// A preset determines the number of ellipsoids and the length of the schedule if they are not
 /// given, and the quality of a PresetGoal (convert.h).
@@ -31,7 +60,7 @@ struct FitProgress {
   double fraction = 0.0;         ///< share of the run that is done, 0 to 1
   double secondsLeft = 0.0;      ///< estimated time to the end of the run
   double voxelsPerSecond = 0.0;  ///< active voxels times `fraction`, in a second
-  /// Parts of a fit in chunks (part_runner.h); 1 part of a fit in one chunk.
+  /// Parts of a fit in chunks; 1 part of a fit in one chunk.
   std::size_t partsDone = 0, parts = 1;
 };
 

@@ -1,20 +1,21 @@
 #pragma once
-/// Turns a fitted field into a stored grid, and a stored grid back into voxels.
+/// Turns a fitted field into a stored grid and a stored grid back into voxels, and encodes the stored grids of
+/// the frames of a sequence.
 
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "esvr/container.h"
+#include "esvr/device.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/field.h"
-#include "esvr/grid_descriptor.h"
-#include "esvr/memory_limit.h"
-#include "esvr/simplified_mask.h"
-#include "esvr/sparse_volume.h"
-#include "esvr/vector_grid.h"
-#include "esvr/voxel_layer.h"
-#include "esvr/work_estimate.h"
+#include "esvr/grid.h"
+#include "esvr/quantised.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 
@@ -29,8 +30,8 @@ struct ActivityOptions {
 /// which a reader determines the active voxels:
 ///  - a threshold. Among the thresholds that increase the squared error by at most 0.004 dB, it is
 ///    the one whose active voxels have the largest intersection over union with the source's;
-///  - a threshold for each block (block_levels.h), unless `activity` is kByValue, if the overlap of the
-///    single one does not suffice (MaskOverlap, simplified_mask.h), those of the blocks do, and the
+///  - a threshold for each block (ellipsoids.h), unless `activity` is kByValue, if the overlap of the
+///    single one does not suffice (MaskOverlap, quantised.h), those of the blocks do, and the
 ///    source's values are not in a file;
 ///  - the source's simplified mask, if `activity` is kAuto, no thresholds suffice, and the source's
 ///    values are not in a file;
@@ -67,7 +68,7 @@ void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, Sto
                                           const SparseVolume& source);
 
 /// Makes a stored grid that holds voxels and no ellipsoids.
-/// \param layer  the voxels of `source` (voxel_layer.h)
+/// \param layer  the voxels of `source` (quantised.h)
 [[nodiscard]] StoredGrid makeStoredVoxels(const GridDescriptor& descriptor,
                                           const SparseVolume& source, VoxelLayer layer);
 
@@ -95,7 +96,7 @@ struct DecodeOptions {
                                           const DecodeOptions& options = {});
 
 /// The voxels that a stored grid represents. If the source was saved as half (ValueType::kHalf), the
-/// active voxels are halfs (roundToHalfs, voxel_layer.h), so that a .vdb file of them has the same
+/// active voxels are halfs (roundToHalfs, quantised.h), so that a .vdb file of them has the same
 /// values and keeps the same bound.
 /// \throws UsageError  the threshold is negative or not finite, or the grid stores voxels or has a far
 ///                     background, so that it says itself which voxels are active
@@ -107,5 +108,36 @@ struct DecodeOptions {
 /// \throws  as for decodeGrid; the components together may take options.maxBytes
 [[nodiscard]] VectorGrid decodeVector(const std::string& name, StoredComponents components,
                                       const DecodeOptions& options = {});
+
+// Encodes the frames of a sequence. The voxels of a frame may refer to those of the frame before
+// it, which usually takes fewer bytes. docs/format.md, "Frames", specifies every byte.
+
+/// Encodes a file as a frame. Each grid that holds voxels, and whose predecessor has the same number
+/// in `previous` and holds voxels too, is stored as its difference from its predecessor if that
+/// takes fewer bytes. All other grids are stored as encodeEsvr() stores them. The bytes are those of
+/// encodeEsvr() if no grid refers to the previous frame. Otherwise they have a short form, without
+/// the metadata, the vectors and the carried grids that are those of the previous frame.
+/// \param previous  the frame before as decodeFrame() returned it; null: the frame stands alone
+/// \throws RuntimeFailure  as for encodeEsvr
+[[nodiscard]] std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previous);
+
+/// Decodes a frame.
+/// \param nameForErrors  name of the file and number of the frame in error texts
+/// \param previous  the frame that encodeFrame() was given; ignored if the frame stands alone
+/// \throws BadInput  as for decodeEsvr; the frame refers to the previous one, and `previous` is null
+///                   or has not the grids that it refers to
+/// \throws MemoryExceeded  as for readEsvr
+[[nodiscard]] EsvrFile decodeFrame(std::span<const std::byte> bytes,
+                                   const std::string& nameForErrors, const ReadLimits& limits,
+                                   const EsvrFile* previous);
+
+/// True if decodeFrame() needs the previous frame.
+/// \throws BadInput  the header or the section table of a frame that stands alone is damaged
+[[nodiscard]] bool dependsOnPrevious(std::span<const std::byte> bytes);
+
+/// Largest number of bytes that a grid adds to a frame, like bytesAdded() for a file.
+/// \param previous  the same grid of the previous frame; null: the grid is stored on its own
+/// \throws RuntimeFailure  as for encodeEsvr
+[[nodiscard]] std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous);
 
 }  // namespace esvr

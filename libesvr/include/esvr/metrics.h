@@ -1,16 +1,19 @@
 #pragma once
-/// Errors of a volume against a reference. Sums are formed in float64 over the bricks of either
-/// volume. Empty space within the box counts as voxels but takes no computing time. Where only one
-/// volume has a brick, the other one has its background or, inside the surface of a narrow band, the
-/// negated background.
+/// Errors of a volume, of a level set, of vectors and of the frames of a sequence against a reference.
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/grid.h"
+#include "esvr/volume.h"
 
 namespace esvr {
+
+// Errors of a volume against a reference. Sums are formed in float64 over the bricks of either
+// volume. Empty space within the box counts as voxels but takes no computing time. Where only one
+// volume has a brick, the other one has its background or, inside the surface of a narrow band, the
+// negated background.
 
 struct CompareOptions {
   std::optional<Box> box{};      ///< box of the PSNR; default: the reference's active bounding box
@@ -48,13 +51,13 @@ struct VolumeMetrics {
                                  const CompareOptions& options = {});
 
 /// The peak of the PSNR of a volume: peakOf() of its active values and its background
-/// (sparse_volume.h). All programs, searches and reports use it.
+/// (volume.h). All programs, searches and reports use it.
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] double peakOf(const SparseVolume& reference);
 
 /// The range to which a bound on errors such as 1 % refers: the largest active value minus the
 /// smallest one, without the background, and 0 if all are equal. The bound of a vector refers to
-/// valueRangeOfVectors() (vector_metrics.h).
+/// valueRangeOfVectors().
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] double valueRangeOf(const SparseVolume& reference);
 
@@ -69,5 +72,71 @@ struct VolumeMetrics {
 /// \throws BadInput    a value in the box is not finite
 [[nodiscard]] double ssim3d(const SparseVolume& reference, const SparseVolume& candidate,
                             const Box& box, double peak);
+
+// Counts the voxels of a level set whose sign is not that of a reference.
+
+struct SignErrors {
+  std::uint64_t voxels = 0;      ///< voxels with another sign than in the reference
+  std::optional<Coord> first{};  ///< index coordinates of one of them
+};
+
+/// Compares the signs of all voxels in the bricks of either volume, active or not. A voxel is
+/// negative (inside) or not; 0 is outside. Where a volume has no brick, the sign is that of
+/// EmptySigns (volume.h). Elsewhere, neither volume has a brick; if no voxel is counted and the
+/// signs around the empty space of both volumes agree, the signs are the same there, too.
+[[nodiscard]] SignErrors compareSigns(const SparseVolume& reference, const SparseVolume& candidate);
+
+// Errors of a grid of vectors against a reference.
+
+/// All PSNR of a grid of vectors have the same peak: by default that of its vectors, peakOfVectors.
+/// A component that is small everywhere therefore has a high PSNR if its error is small against the
+/// longest vector.
+struct VectorMetrics {
+  VolumeMetrics magnitude;  ///< of the lengths of the vectors
+  std::array<VolumeMetrics, kComponents> components;
+};
+
+/// The length of the longest active vector, or 1 if all are zero. It does not depend on the
+/// direction of the axes.
+/// \throws BadInput  there is no active voxel
+[[nodiscard]] double peakOfVectors(const VectorVolume& reference);
+
+/// The range to which a bound on the errors of all components refers, such as 1 %: the largest
+/// valueRangeOf() of a component. A component that hardly changes is thus not stored more precisely
+/// than the others.
+/// \throws BadInput  there is no active voxel
+[[nodiscard]] double valueRangeOfVectors(const VectorVolume& reference);
+
+/// Compares vectors by compareVolumes. A voxel of a grid of vectors is active if it is active in
+/// any component.
+/// \param options  the default of the peak is peakOfVectors(reference)
+/// \throws BadInput, UsageError  as for compareVolumes
+[[nodiscard]] VectorMetrics compareVectors(const VectorVolume& reference,
+                                           const VectorVolume& candidate,
+                                           const CompareOptions& options = {});
+
+// The error of the change of a grid from one frame of a sequence to the next. Errors that differ
+// from frame to frame are seen as flicker, even if each frame is close to its reference.
+
+/// The volumes of a grid in two consecutive frames, which must outlive the object.
+struct FramePair {
+  const SparseVolume& before;
+  const SparseVolume& after;
+};
+
+/// The temporal difference of a grid: `after` minus `before` for each voxel, rounded to float32. A
+/// voxel is active if it is active in either. Where only one volume has a brick, the other one has
+/// its background or, inside the surface of a narrow band, the negated background.
+[[nodiscard]] SparseVolume temporalDifference(const FramePair& frames);
+
+/// The PSNR of the candidate's temporal difference against that of the reference, in dB; +inf if
+/// they are equal. The result does not depend on the number of threads.
+/// \param options  The default of the box encloses the active voxels of the reference in both
+///                 frames. The default of the peak is the larger one of its peaks (peakOf) in the
+///                 two frames, so that the value compares to the PSNR of a frame.
+/// \throws BadInput  the reference has no active voxel in both frames; a value is not finite
+/// \throws UsageError  as for compareVolumes
+[[nodiscard]] double temporalPsnr(const FramePair& reference, const FramePair& candidate,
+                                  const CompareOptions& options = {});
 
 }  // namespace esvr

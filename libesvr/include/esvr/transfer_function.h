@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

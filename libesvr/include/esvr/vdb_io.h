@@ -1,30 +1,30 @@
 #pragma once
-/// Reads and writes OpenVDB (.vdb) and NanoVDB (.nvdb) files. A reader recognises the format by the
-/// file's first bytes; a writer chooses it by the extension.
+/// OpenVDB and NanoVDB: reads and writes their files, makes NanoVDB grids in memory, measures what their own
+/// forms of a grid cost, and compares the surfaces of level sets.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
-#include "esvr/carried_grid.h"
-#include "esvr/coord.h"
-#include "esvr/grid_descriptor.h"
-#include "esvr/inactive_values.h"
-#include "esvr/packed_grid.h"
-#include "esvr/sparse_volume.h"
-#include "esvr/vector_grid.h"
+#include "esvr/grid.h"
+#include "esvr/volume.h"
 
 namespace esvr {
+
+// Reads and writes OpenVDB (.vdb) and NanoVDB (.nvdb) files. A reader recognises the format by the
+// file's first bytes; a writer chooses it by the extension.
 
 /// Properties of one grid of a file.
 struct GridSummary {
   std::string name;        ///< stored name; may be empty or shared by several grids
-  std::string uniqueName;  ///< the name that --grid takes (GridNames::unique, grid_names.h)
+  std::string uniqueName;  ///< the name that --grid takes (GridNames::unique, grid.h)
   std::string valueType;   ///< OpenVDB's name: "float", "double", "vec3s", "ptdataidx32", ...
   bool savedAsHalf = false;
   GridClass gridClass = GridClass::kUnknown;
@@ -95,7 +95,7 @@ struct VolumeGrid {
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
                                   const ReadOptions& options = {});
 
-/// The same for a grid that a user has named (GridNames in grid_names.h): "density", "density[1]".
+/// The same for a grid that a user has named (GridNames in grid.h): "density", "density[1]".
 /// "vel.x" is read as a component of the vectors "vel" if no grid has this very name.
 /// \throws BadInput, CannotConvert, MemoryExceeded  as above; no grid has the name, or several have it
 ///                                                  (the text lists the grids)
@@ -218,5 +218,95 @@ inline constexpr const char* kWriterKey = "esvr_writer";
 
 /// Versions of the libraries compiled in, for --version: "OpenVDB 10.0.1, NanoVDB 32.4.2".
 [[nodiscard]] std::string vdbVersions();
+
+// NanoVDB grids in memory, for the reference renderer (renderNano).
+
+/// The value type of a NanoVDB grid. Quantised types have a range of values for each leaf; FpN also
+/// has a number of bits for each leaf. The background within a leaf may have an error of half a
+/// step, and is then drawn like any other value.
+enum class NanoValues { kFloat, kFp4, kFp8, kFp16, kFpN };
+
+/// A NanoVDB grid in the index space of the volume. Voxels outside its leaves are the background.
+struct NanoVolume {
+  NanoValues values = NanoValues::kFloat;
+  std::shared_ptr<const std::byte[]> data;  ///< NanoVDB's grid buffer, aligned to 32 bytes
+  std::size_t bytes = 0;
+  float background = 0.0f;
+  Box voxels;  ///< bounding box of the leaves; empty if there are none
+};
+
+/// Makes a NanoVDB grid without dithering. Level sets lose the sign of their inactive voxels.
+/// \throws std::logic_error  the volume violates its invariants (checkInvariants)
+[[nodiscard]] NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values);
+
+// Writes a grid in every form of OpenVDB and NanoVDB files, as baselines for .esvr files. The
+// files are written and read by the two libraries, and the times are measured. To write files for
+// users, call writeGrids.
+
+enum class PackedForm {
+  kOpenVdbFloat,
+  kOpenVdbHalf,
+  kNanoFloat,
+  kNanoFp16,  ///< 16 bits per voxel between the smallest and the largest value of a leaf
+  kNanoFp8,
+  kNanoFp4,
+  kNanoFpN,  ///< the number of bits of a leaf follows from VoxelPacking::tolerance
+};
+
+enum class PackedCodec { kNone, kZip, kBlosc };
+
+struct VoxelPacking {
+  PackedForm form = PackedForm::kOpenVdbFloat;
+  PackedCodec codec = PackedCodec::kBlosc;
+  double tolerance = 0.0;  ///< largest error of a voxel for kNanoFpN, in value units; above 0
+};
+
+[[nodiscard]] bool isNanoVdb(PackedForm form);
+/// The value type of a NanoVDB grid of this form; kFloat for OpenVDB's forms.
+[[nodiscard]] NanoValues nanoValues(PackedForm form);
+
+class VoxelPacker {
+ public:
+  /// Builds the OpenVDB grid that the files are written from. Constant leaves become tiles.
+  explicit VoxelPacker(const VolumeGrid& grid);
+  ~VoxelPacker();
+  VoxelPacker(const VoxelPacker&) = delete;
+  VoxelPacker& operator=(const VoxelPacker&) = delete;
+
+  /// Writes a file and replaces an existing one. OpenVDB does not zip level sets and fog volumes;
+  /// with kZip the class of such a grid is therefore written as unknown. OpenVDB files do not hold
+  /// inactive values.
+  /// \return seconds from OpenVDB's grid to the written file
+  /// \throws UsageError  half floats cannot hold a value, NanoVDB cannot hold the transform, or the
+  ///                     tolerance is missing
+  /// \throws RuntimeFailure  the file is not writable
+  double write(const std::filesystem::path& path, const VoxelPacking& packing) const;
+
+ private:
+  struct Source;
+  std::unique_ptr<const Source> source_;
+};
+
+/// Seconds that the form's own library takes to read a file's grid into memory, as OpenVDB's tree
+/// or NanoVDB's buffer.
+/// \throws BadInput  the file is not of this form
+[[nodiscard]] double secondsToRead(const std::filesystem::path& path, PackedForm form);
+
+// The distance between the surfaces of two level sets.
+
+/// A Hausdorff distance of two meshes, over their vertices.
+struct MeshDistance {
+  double voxels = 0.0;  ///< in voxels (index space)
+  double world = 0.0;   ///< largest distance of the same pairs of points, in units of the world
+};
+
+/// Makes a mesh of each level set's zero crossing with openvdb::tools::volumeToMesh, at isovalue 0
+/// and without adaptivity. For every vertex of either mesh, the nearest point of the other mesh is
+/// sought; the result is the largest distance of such a pair, in both directions. The points are
+/// sought on the polygons that are nearest to the 64 voxels around the vertex, so that the distance
+/// is never too small; if these voxels are farther than 3 voxels from the mesh, on all polygons. Pairs are sought in index space. Their distance in the world is that after the
+/// transform of the reference.
+/// \return infinity if only one of the grids has a surface, and 0 if none has
+[[nodiscard]] MeshDistance meshDistance(const VolumeGrid& reference, const VolumeGrid& candidate);
 
 }  // namespace esvr

@@ -1,6 +1,6 @@
 // Builds a volume of two voxels that are 16 apart along x, and prints their bounding box.
 #include <esvr/device.h>
-#include <esvr/sparse_volume.h>
+#include <esvr/volume.h>
 
 #include <iostream>
 
