@@ -1,5 +1,5 @@
 // Bundles each page into one HTML file, and the style and the script of the pages of esvr-compare:
-// `node build.mjs` writes dist/ and libesvr/report/dist/, `node build.mjs --check` fails if they are not
+// `node build.mjs` writes dist/ and programs/dist/, `node build.mjs --check` fails if they are not
 // what it would write.
 import { build } from "esbuild";
 import { decoded, encoded } from "./src/local/base91.js";
@@ -15,7 +15,7 @@ const pages = [
 ];
 
 /** The pages of esvr-compare, which the program writes. */
-const report = "../../libesvr/report";
+const report = "../../programs";
 
 /** `import text from "worker:./file.js"` gives the bundled text of a worker. */
 const workers = {

@@ -260,7 +260,7 @@ std::map<std::string, std::string> optionsOf(const Program& program) {
 const std::vector<std::string>& testSources() {
   static const std::vector<std::string> kSources = [] {
     std::vector<std::string> sources;
-    for (const char* folder : {"/tests/cli", "/tests/samples"})
+    for (const char* folder : {"/tests/cli", "/tests/programs", "/tests/samples"})
       for (const auto& file :
            std::filesystem::directory_iterator(ESVR_SOURCE_DIR + std::string(folder)))
         if (file.path().string().ends_with("_test.cpp") &&

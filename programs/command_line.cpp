@@ -1,0 +1,226 @@
+// A program's command line: its description, what --help prints, parsing, and inputs that come through
+// a pipe.
+#include "programs/command_line.h"
+
+#include <algorithm>
+#include <boost/program_options/errors.hpp>
+#include <boost/program_options/parsers.hpp>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <utility>
+
+#include "programs/help_text.h"
+#include "programs/memory.h"
+
+namespace esvr::cli {
+namespace {
+
+constexpr unsigned kLineLength = 80;
+constexpr unsigned kMinDescriptionLength = 44;
+/// Far more than any machine has processors; each thread takes memory of its own.
+constexpr int kMostThreads = 4096;
+constexpr const char* kDevice = "device";
+constexpr const char* kRest = "unexpected arguments";  // no option can have this name
+
+po::options_description commonOptions() {
+  po::options_description common("Common options", kLineLength, kMinDescriptionLength);
+  // clang-format off
+  common.add_options()
+    ("threads", po::value<int>()->value_name("N"), "number of threads (default: as many as the machine has)")
+    ("quiet,q", po::bool_switch(), "print errors only")
+    ("verbose,v", po::bool_switch(), "print more messages")
+    ("help,h", po::bool_switch(), "print this text and exit")
+    ("version", po::bool_switch(), "print the versions of all parts and exit");
+  // clang-format on
+  return common;
+}
+
+Arguments withCommonOptions(po::variables_map values) {
+  Arguments arguments{.values = std::move(values)};
+  if (arguments.get<bool>("verbose")) arguments.verbosity = Verbosity::kVerbose;
+  if (arguments.get<bool>("quiet")) arguments.verbosity = Verbosity::kQuiet;
+  if (const auto threads = arguments.find<int>("threads")) {
+    requireRange("threads", *threads, 1, kMostThreads);
+    arguments.threads = *threads;
+  }
+  return arguments;
+}
+
+/// The texts that a value holds, which may be replaced.
+std::vector<std::string*> textsOf(po::variable_value& value) {
+  if (value.empty()) return {};
+  if (auto* one = boost::any_cast<std::string>(&value.value())) return {one};
+  std::vector<std::string*> texts;
+  for (std::string& text : value.as<std::vector<std::string>>()) texts.push_back(&text);
+  return texts;
+}
+
+/// Replaces the name of a pipe by that of a file with a copy of its bytes.
+void takePipe(const Arguments& arguments, std::string& input, InputFiles& files) {
+  files.piped.push_back(std::make_shared<PipedInput>(input, scratchFolderOf(arguments)));
+  input = files.piped.back()->path().string();
+}
+
+/// Fills Arguments::inputs.
+void collectInputs(const std::vector<std::string>& volumes, const std::vector<std::string>& texts,
+                   Arguments& arguments) {
+  InputFiles files;
+  bool hasStandardInput = false;
+  const auto collect = [&](const std::string& name, bool isVolume) {
+    if (!arguments.has(name)) return;
+    for (std::string* input : textsOf(arguments.values.at(name))) {
+      if (isVolume && *input == kStandardInput && std::exchange(hasStandardInput, true))
+        throw UsageError("standard input (-) is one file; it cannot be two inputs");
+      if (isVolume && PipedInput::isPipe(*input)) takePipe(arguments, *input, files);
+      files.paths.emplace_back(*input);
+    }
+  };
+  for (const std::string& name : volumes) collect(name, true);
+  for (const std::string& name : texts) collect(name, false);
+  arguments.inputs = std::move(files);
+}
+
+void appendSection(std::ostream& out, const char* title, const std::string& text) {
+  if (!text.empty()) out << title << '\n' << text << "\n\n";
+}
+
+}  // namespace
+
+CommandLine::CommandLine(ProgramText text)
+    : text_(std::move(text)),
+      own_("Options", kLineLength, kMinDescriptionLength),
+      common_(commonOptions()),
+      rest_(kRest) {}
+
+void CommandLine::argument(const std::string& name, const std::string& shown) {
+  arguments_.push_back({name, shown, true});
+}
+
+void CommandLine::optionalArgument(const std::string& name, const std::string& shown) {
+  arguments_.push_back({name, shown, false});
+}
+
+void CommandLine::repeatedArgument(const std::string& name) { rest_ = name; }
+
+/// The own options that --help shows, or those that it leaves to `--help expert`.
+po::options_description CommandLine::shown(bool isExpert) const {
+  po::options_description part(isExpert ? "Expert options" : "Options", kLineLength,
+                               kMinDescriptionLength);
+  for (const auto& option : own_.options()) {
+    const bool isMain = main_.empty() || std::ranges::count(main_, option->long_name()) > 0;
+    if (isMain != isExpert) part.add(option);
+  }
+  return part;
+}
+
+std::string CommandLine::helpText() const {
+  std::ostringstream out;
+  out << wrapped(text_.purpose, kLineLength) << "\n\n";
+  appendSection(out, "Usage:", text_.usage);
+  if (const auto options = shown(false); !options.options().empty()) out << options << '\n';
+  out << common_ << '\n';
+  appendSection(out, "Notes:", wrapped(text_.notes, kLineLength));
+  if (hasExpertHelp()) out << text_.name << " --help expert shows further options and notes.\n\n";
+  appendSection(out, "Examples:", text_.examples);
+  std::string help = out.str();
+  help.pop_back();  // removes the empty line after the last section
+  return help;
+}
+
+std::string CommandLine::expertText() const {
+  std::ostringstream out;
+  if (const auto options = shown(true); !options.options().empty()) out << options << '\n';
+  appendSection(out, "Notes:", wrapped(text_.details, kLineLength));
+  std::string help = out.str();
+  help.pop_back();
+  return help;
+}
+
+void CommandLine::helpTopic(const std::string& name, const std::string& text) {
+  helpTopics_[name] = text;
+}
+
+/// The arguments without a dash.
+std::vector<std::string> CommandLine::words(const po::variables_map& values) const {
+  std::vector<std::string> all;
+  for (const Argument& argument : arguments_)
+    if (values.count(argument.name) != 0) all.push_back(values[argument.name].as<std::string>());
+  if (values.count(rest_) != 0)
+    for (const auto& word : values[rest_].as<std::vector<std::string>>()) all.push_back(word);
+  return all;
+}
+
+std::vector<OptionGroup> CommandLine::groups() const {
+  return {{"OPTIONS", &own_}, {"COMMON OPTIONS", &common_}};
+}
+
+std::optional<std::string> CommandLine::topic(const std::string& name) const {
+  if (name == "man") return manPage(text_, groups());
+  if (name == "options") return optionNames(groups());
+  if (name == "expert" && hasExpertHelp()) return expertText();
+  const auto found = helpTopics_.find(name);
+  return found == helpTopics_.end() ? std::nullopt : std::optional(found->second);
+}
+
+/// The text of the topic that follows --help, or the whole help.
+std::string CommandLine::helpAskedFor(const po::variables_map& values) const {
+  for (const auto& word : words(values))
+    if (const auto text = topic(word)) return *text;
+  return helpText();
+}
+
+po::variables_map CommandLine::parseValues(int argc, const char* const* argv) const {
+  po::options_description all, hidden;
+  po::positional_options_description places;
+  for (const Argument& argument : arguments_) {
+    hidden.add_options()(argument.name.c_str(), po::value<std::string>());
+    places.add(argument.name.c_str(), 1);
+  }
+  hidden.add_options()(rest_.c_str(), po::value<std::vector<std::string>>());
+  places.add(rest_.c_str(), -1);
+  all.add(own_).add(common_).add(hidden);
+
+  po::variables_map values;
+  po::store(po::command_line_parser(argc, argv).options(all).positional(places).run(), values);
+  po::notify(values);
+  return values;
+}
+
+void CommandLine::requireArguments(const po::variables_map& values) const {
+  for (const Argument& argument : arguments_)
+    if (argument.required && values.count(argument.name) == 0)
+      throw UsageError("missing argument " + argument.shown);
+  if (values.count(kRest) != 0)
+    throw UsageError("unexpected argument '" +
+                     values[kRest].as<std::vector<std::string>>().front() + "'");
+}
+
+std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) const try {
+  po::variables_map values = parseValues(argc, argv);
+  if (values["help"].as<bool>()) {
+    std::cout << helpAskedFor(values);
+    return std::nullopt;
+  }
+  if (values["version"].as<bool>()) {
+    std::cout << versionText(text_.name);
+    return std::nullopt;
+  }
+  requireArguments(values);
+  Arguments arguments = withCommonOptions(std::move(values));
+  collectInputs(volumeInputs_, textInputs_, arguments);
+  return arguments;
+} catch (const po::error& error) {
+  throw UsageError(error.what());
+}
+
+void addDevice(po::options_description& options, const std::string& purpose,
+               const std::string& more) {
+  const std::string help = purpose + "auto (a GPU if one is usable), cpu, cuda or cuda:N" + more;
+  options.add_options()(kDevice, po::value<std::string>()->value_name("D")->default_value("auto"),
+                        help.c_str());
+}
+
+std::string deviceOf(const Arguments& arguments) { return arguments.get<std::string>(kDevice); }
+
+}  // namespace esvr::cli

@@ -1,0 +1,122 @@
+#pragma once
+/// A program's command line: GNU-style options, arguments, --help and --version.
+///
+///     cli::CommandLine line({.name = "esvr-sample", ...});
+///     line.argument("output", "OUT.vdb");
+///     line.options()("resolution", po::value<int>()->value_name("N")->default_value(128), "...");
+///     const auto parsed = line.parse(argc, argv);
+///     if (!parsed) return 0;  // --help or --version was asked for, and is printed
+
+#include <boost/program_options/options_description.hpp>
+#include <boost/program_options/positional_options.hpp>
+#include <boost/program_options/value_semantic.hpp>
+#include <boost/program_options/variables_map.hpp>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "esvr/error.h"
+#include "programs/files.h"
+#include "programs/help_text.h"
+#include "programs/messages.h"
+
+namespace esvr::cli {
+
+namespace po = boost::program_options;
+
+/// The arguments of a run, including the options that all programs have.
+struct Arguments {
+  po::variables_map values;
+  Verbosity verbosity = Verbosity::kNormal;
+  int threads = 0;  ///< 0: as many as the machine has
+  InputFiles inputs{};
+
+  [[nodiscard]] bool has(const std::string& option) const { return values.count(option) != 0; }
+  template <class T>
+  [[nodiscard]] const T& get(const std::string& option) const {
+    return values[option].as<T>();
+  }
+  /// Nothing if the option was not given and has no default.
+  template <class T>
+  [[nodiscard]] std::optional<T> find(const std::string& option) const {
+    return has(option) ? std::optional<T>(get<T>(option)) : std::nullopt;
+  }
+};
+
+class CommandLine {
+ public:
+  explicit CommandLine(ProgramText text);
+
+  /// The program's own options.
+  po::options_description& options() { return own_; }
+
+  /// Names the options that --help shows, so that it fits on two screens. `--help expert` shows the
+  /// others and ProgramText::details. Without this call, --help shows all options.
+  void mainOptions(std::vector<std::string> names) { main_ = std::move(names); }
+
+  /// Adds an argument without a dash. Arguments are taken in this order; the value is a
+  /// std::string.
+  /// \param shown  name in the usage text: "OUT.vdb"
+  void argument(const std::string& name, const std::string& shown);
+  /// Adds an argument that may be left out. Such arguments come last.
+  void optionalArgument(const std::string& name, const std::string& shown);
+  /// Adds an argument for all remaining ones. Its value is a std::vector<std::string>.
+  void repeatedArgument(const std::string& name);
+
+  /// Declares that the values of arguments or options are names of input files with volumes. They
+  /// may be "-", standard input, or the name of a pipe; parse() replaces these by names of files.
+  void volumeInputs(std::vector<std::string> names) { volumeInputs_ = std::move(names); }
+  /// The same of other input files, such as cameras, whose readers accept a pipe.
+  void textInputs(std::vector<std::string> names) { textInputs_ = std::move(names); }
+
+  /// Adds a text that `--help NAME` prints instead of the whole help. Every program has the topics
+  /// `man`, its man page, and `options`, the names of its options.
+  void helpTopic(const std::string& name, const std::string& text);
+
+  /// \return nothing if --help or --version was printed to stdout
+  /// \throws UsageError  an option or an argument is invalid
+  /// \throws Error  as PipedInput, for an input that comes through a pipe
+  [[nodiscard]] std::optional<Arguments> parse(int argc, const char* const* argv) const;
+
+ private:
+  struct Argument {
+    std::string name, shown;
+    bool required;
+  };
+  [[nodiscard]] po::variables_map parseValues(int argc, const char* const* argv) const;
+  void requireArguments(const po::variables_map& values) const;
+  [[nodiscard]] std::string helpAskedFor(const po::variables_map& values) const;
+  [[nodiscard]] std::vector<std::string> words(const po::variables_map& values) const;
+  [[nodiscard]] std::optional<std::string> topic(const std::string& name) const;
+  [[nodiscard]] std::vector<OptionGroup> groups() const;
+  [[nodiscard]] po::options_description shown(bool isExpert) const;
+  [[nodiscard]] bool hasExpertHelp() const { return !main_.empty() || !text_.details.empty(); }
+  [[nodiscard]] std::string helpText() const;
+  [[nodiscard]] std::string expertText() const;
+
+  ProgramText text_;
+  po::options_description own_, common_;
+  std::vector<std::string> main_;  ///< options that --help shows; empty: all
+  std::vector<Argument> arguments_;
+  std::map<std::string, std::string> helpTopics_;
+  std::vector<std::string> volumeInputs_, textInputs_;  ///< names of arguments and options
+  std::string rest_;  ///< the repeated argument, or a name that is not used
+};
+
+/// \throws UsageError  the value of the option is outside [low, high] or not a number
+template <class T>
+void requireRange(const std::string& option, T value, T low, T high) {
+  if (value >= low && value <= high) return;
+  throw UsageError("--" + option + " must be from " + std::to_string(low) + " to " +
+                   std::to_string(high) + ", not " + std::to_string(value));
+}
+
+/// Adds the option --device. Its help text begins with `purpose` and ends with `more`.
+void addDevice(po::options_description& options, const std::string& purpose = {},
+               const std::string& more = {});
+
+/// The value of the option, as selectDevice() or selectDevices() take it.
+[[nodiscard]] std::string deviceOf(const Arguments& arguments);
+
+}  // namespace esvr::cli

@@ -1,0 +1,117 @@
+// Names of the enumerations that files hold, what tells grids of one name apart, and bytes of grids.
+#include "programs/names.h"
+
+#include <map>
+
+#include "programs/messages.h"
+
+namespace esvr::cli {
+
+std::string nameOf(ValueType type) {
+  switch (type) {
+    case ValueType::kHalf:
+      return "half";
+    case ValueType::kDouble:
+      return "double";
+    case ValueType::kFloat:
+      break;
+  }
+  return "float";
+}
+
+std::string nameOf(KernelForm form) { return form == KernelForm::kPaper ? "paper" : "continuous"; }
+
+std::string nameOf(TopologyKind kind) {
+  switch (kind) {
+    case TopologyKind::kBricks:
+      return "bricks";
+    case TopologyKind::kMask:
+      return "mask";
+    case TopologyKind::kBlocks:
+      return "blocks";
+    case TopologyKind::kThreshold:
+      break;
+  }
+  return "threshold";
+}
+
+std::string activityOf(const StoredGrid& grid) {
+  if (grid.topology == TopologyKind::kMask) return "a mask";
+  if (grid.topology != TopologyKind::kBlocks)
+    return "threshold " + shortNumber(grid.activeThreshold);
+  return "thresholds of blocks around " +
+         shortNumber(thresholdAt(grid.activeThreshold, kMiddleLevel));
+}
+
+std::string valuesOf(const GridSummary& grid) {
+  return grid.savedAsHalf ? grid.valueType + " as half" : grid.valueType;
+}
+
+std::string activeVoxelsOf(const GridSummary& grid) {
+  return grid.isScalar || grid.activeVoxels > 0 ? std::to_string(grid.activeVoxels) : "-";
+}
+
+namespace {
+
+GridTraits traitsOf(const GridSummary& grid) {
+  return {grid.name, grid.valueType, grid.gridClass, grid.activeVoxels, grid.activeBox};
+}
+
+/// The traits of the grid of a .vdb file that is stored so.
+GridTraits traitsOf(const EsvrFile& file, const GridOfFile& grid) {
+  if (grid.isCarried) {
+    const CarriedGrid& carried = file.carried[grid.index];
+    if (carried.bytes.empty()) return {.name = carried.name};  // they were not read
+    return traitsOf(inspectCarried(carried));
+  }
+  const StoredGrid& first = file.grids[grid.isVector ? file.vectors[grid.index].first : grid.index];
+  const bool isDouble = first.descriptor.valueType == ValueType::kDouble;
+  GridTraits traits{nameOf(file, grid), isDouble ? "double" : "float", first.descriptor.gridClass,
+                    first.activeVoxels, first.activeBox};
+  if (grid.isVector) traits.valueType = isDouble ? "vec3d" : "vec3s";
+  traits.values = {first.valueMin, first.valueMax};
+  return traits;
+}
+
+}  // namespace
+
+std::vector<GridTraits> traitsOf(const VdbSummary& file) {
+  std::vector<GridTraits> traits;
+  for (const GridSummary& grid : file.grids) traits.push_back(traitsOf(grid));
+  return traits;
+}
+
+std::vector<GridTraits> traitsOf(const EsvrFile& file) {
+  std::vector<GridTraits> traits;
+  for (const GridOfFile& grid : gridsInOrder(file)) traits.push_back(traitsOf(file, grid));
+  return traits;
+}
+
+void addRanges(std::span<const GridTraits> other,
+               const std::function<std::optional<std::array<float, 2>>(std::size_t)>& rangeOf,
+               std::vector<GridTraits>& traits) {
+  std::map<std::string, std::size_t> counts, others;
+  for (const GridTraits& grid : traits) ++counts[grid.name];
+  for (const GridTraits& grid : other) ++others[grid.name];
+  for (std::size_t g = 0; g < traits.size(); ++g) {
+    const auto there = others.find(traits[g].name);
+    const bool isNeeded = there != others.end() && there->second != counts[traits[g].name];
+    if (isNeeded && !traits[g].values) traits[g].values = rangeOf(g);
+  }
+}
+
+std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {
+  std::uint64_t bytes = 0;
+  for (const auto& section : file.sections)
+    if (section.grid == grid) bytes += section.storedBytes;
+  return bytes;
+}
+
+std::uint64_t ownBytes(const EsvrSummary& file, std::size_t grid) {
+  std::uint64_t bytes = 0;
+  for (const auto& section : file.sections)
+    if (section.grid == grid && !section.sharedWith) bytes += section.storedBytes;
+  return bytes;
+}
+
+}  // namespace esvr::cli

@@ -1,0 +1,73 @@
+#pragma once
+/// The values of options: numbers, words, sizes, bounds and boxes. Every message names the option.
+
+#include <cstdint>
+#include <initializer_list>
+#include <string>
+#include <vector>
+
+#include "core/parse_text.h"
+#include "esvr/coord.h"
+#include "esvr/error.h"
+
+namespace esvr::cli {
+
+// The library's functions that parse text.
+using esvr::LeadingNumber;
+using esvr::parseLeadingNumber;
+using esvr::parseNumber;
+using esvr::parseWhole;
+using esvr::splitText;
+
+/// A word that an option takes, and what it stands for.
+template <class T>
+struct Choice {
+  const char* word;
+  T value;
+};
+
+/// The value of a word. \throws UsageError  the word is unknown; the message lists the known ones
+template <class T>
+T choose(const std::string& option, const std::string& given,
+         std::initializer_list<Choice<T>> choices) {
+  std::string words;
+  for (const auto& choice : choices) {
+    if (given == choice.word) return choice.value;
+    words += (words.empty() ? "" : ", ") + std::string(choice.word);
+  }
+  throw UsageError("--" + option + " must be one of " + words + ", not '" + given + "'");
+}
+
+/// Parses a text like "1,-2.5,3e2" with `count` finite numbers.
+/// \throws UsageError  the text is not of this form; the message names the option
+[[nodiscard]] std::vector<double> parseNumbers(const std::string& option, const std::string& text,
+                                               std::size_t count);
+
+/// Parses "50000", "50KB" or "2.6MB" (units of 1000), or "48KiB" (units of 1024), in upper or lower
+/// case. The size is at least 1.
+/// \throws UsageError  the text is not of this form; the message names the option
+[[nodiscard]] std::uint64_t parseByteSize(const std::string& option, const std::string& text);
+
+/// Parses the memory of a GPU in the same form. A number without a unit below 1,000,000 is one of
+/// gigabytes, as in the first versions of --max-vram; as bytes it would be less than a GPU can use.
+/// \return at least 1,000,000
+/// \throws UsageError  the text is not of this form, or the memory is less
+[[nodiscard]] std::uint64_t parseDeviceMemory(const std::string& option, const std::string& text);
+
+/// A bound in units of the values, or as a share of their range.
+struct ErrorBound {
+  double amount = 0.0;
+  bool relative = false;  ///< `amount` is a share of the range
+
+  [[nodiscard]] double absolute(double range) const { return relative ? amount * range : amount; }
+};
+
+/// Parses "0.01", or "1%" for a share of the range of values.
+/// \throws UsageError  the text is not of this form, or not above 0; the message names the option
+[[nodiscard]] ErrorBound parseErrorBound(const std::string& option, const std::string& text);
+
+/// Parses "x0,y0,z0,x1,y1,z1": the lowest and the highest voxel, both inside the box.
+/// \throws UsageError  the text is not of this form, or the box is empty
+[[nodiscard]] Box parseBox(const std::string& text, const std::string& option = "box");
+
+}  // namespace esvr::cli

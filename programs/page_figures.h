@@ -1,0 +1,115 @@
+#pragma once
+/// What a page shows: tables of figures, charts, pictures and maps of their errors.
+
+#include <string>
+#include <vector>
+
+#include "esvr/image.h"
+#include "programs/data_table.h"
+#include "programs/page.h"
+
+namespace esvr::report {
+
+/// How rows, curves and pictures stand out.
+enum class Emphasis { kNone, kOurs, kRival };
+
+/// The class in page.css; empty for kNone.
+[[nodiscard]] inline const char* classOf(Emphasis emphasis) {
+  return emphasis == Emphasis::kOurs ? "ours" : emphasis == Emphasis::kRival ? "rival" : "";
+}
+
+// Tables.
+
+struct CellPlace {
+  std::size_t row = 0, column = 0;
+  friend bool operator==(const CellPlace&, const CellPlace&) = default;
+};
+
+struct FigureTable {
+  /// Consecutive rows under a heading.
+  struct Group {
+    std::string heading;
+    std::size_t rows = 0;
+  };
+
+  DataTable table{};                  ///< its title is the caption; the first column names the row
+  std::vector<std::string> folded{};  ///< keys of columns whose figures are folded below their row
+  std::string reason{};               ///< key of the column that says why a row has no figures
+  std::vector<Group> groups{};        ///< groups of all rows; if there are none, rows follow on
+  std::vector<Emphasis> emphasis{};   ///< of each row, or nothing
+  std::vector<CellPlace> best{};      ///< cells that are the best of their group
+  bool sortable = true;               ///< whether a click on a header sorts
+};
+
+/// Columns without a figure are left out. Every cell of a column of numbers has its number with all
+/// digits in the attribute data-value, which is empty where there is none.
+[[nodiscard]] Html toHtml(const FigureTable& figures);
+
+// Charts, which the script of a page draws (charts.js) from the JSON that stands in the page.
+
+struct Point {
+  double x = 0.0, y = 0.0;
+  std::string note{};  ///< more about the point, where it is read out
+};
+
+struct Series {
+  std::string name;
+  /// Those that are not finite, or not above 0 on a logarithmic axis, are passed over.
+  std::vector<Point> points{};
+  Emphasis emphasis = Emphasis::kNone;  ///< kOurs is drawn in front, with a thicker line
+  bool joined = true;                   ///< whether a line joins the points, by increasing x
+};
+
+/// How the values of an axis are written.
+enum class Unit { kNone, kBytes, kSeconds, kPercent };
+
+struct ChartAxis {
+  std::string label{};
+  Unit unit = Unit::kNone;
+  bool logarithmic = false;
+};
+
+struct Chart {
+  std::string title{};
+  ChartAxis x{}, y{};
+  std::vector<Series> series{};
+  /// Whether a second scale of y has the PSNR of errors, which are percentages of the peak.
+  bool decibels = false;
+};
+
+[[nodiscard]] Html toHtml(const Chart& chart);
+
+// Maps of the errors of pictures, and the scale that says what their colors mean.
+
+/// The error with the last color; larger errors have this color too. The largest possible error of
+/// a channel is 1.
+inline constexpr double kMostError = 0.125;
+
+/// Gives the pixels of a gray map their colors, from black to a light yellow. Colors change with
+/// the square root of the error, so that small errors are seen.
+/// \param map  errors as a share of kMostError, 0 to 1
+void colorErrors(Image& map);
+
+/// The scale of the colors, with ticks.
+[[nodiscard]] Html errorScale();
+
+// Pictures. All those of a page are enlarged and moved together.
+
+/// A picture with its errors.
+struct Shot {
+  std::string name, figures{};  ///< caption: what it shows, and what was measured
+  std::string png{};
+  std::string errorPng{};  ///< in the colors of errorScale(); empty for the reference
+  Emphasis emphasis = Emphasis::kNone;
+};
+
+struct PictureSheet {
+  std::string caption{};
+  Shot reference;
+  std::vector<Shot> shots{};   ///< those of kOurs are also shown in halves with the reference
+  std::vector<Shot> others{};  ///< are folded
+};
+
+[[nodiscard]] Html toHtml(const PictureSheet& sheet);
+
+}  // namespace esvr::report
