@@ -5,8 +5,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "cli/shell_word.h"
 #include "esvr/error.h"
+#include "programs/messages.h"
 
 namespace esvr::vdb2esvr {
 namespace {

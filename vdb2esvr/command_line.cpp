@@ -1,12 +1,12 @@
-#include "vdb2esvr/command_line.h"
-
-#include "cli/device_option.h"
-#include "cli/host_memory.h"
-#include "cli/sequence.h"
-#include "cli/table.h"
-#include "esvr/convert.h"
+// What `vdb2esvr --help` says, and the options that the program has.
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/paper_options.h"
+
+#include "esvr/convert.h"
+#include "programs/command_line.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
+#include "programs/sequence.h"
+#include "vdb2esvr/paper.h"
 
 namespace esvr::vdb2esvr {
 namespace {

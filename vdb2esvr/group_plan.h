@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "cli/sequence.h"
 #include "esvr/sequence_file.h"
+#include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {
 

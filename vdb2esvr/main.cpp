@@ -5,8 +5,8 @@
 #include <optional>
 #include <sstream>
 
-#include "cli/run_main.h"
 #include "esvr/error.h"
+#include "programs/run_main.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/run.h"
 

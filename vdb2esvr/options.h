@@ -1,23 +1,32 @@
 #pragma once
-/// The options of vdb2esvr.
+/// The options of vdb2esvr, and the goals that single grids have instead of the goal of all others.
 
+#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "cli/log.h"
-#include "cli/sequence.h"
 #include "esvr/container.h"
 #include "esvr/convert.h"
 #include "esvr/vdb_io.h"
+#include "programs/command_line.h"
+#include "programs/messages.h"
+#include "programs/sequence.h"
 #include "vdb2esvr/choose_grids.h"
-#include "vdb2esvr/grid_goals.h"
 #include "vdb2esvr/progress_bar.h"
 
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
+
+/// The goal of a single grid.
+struct GridGoal {
+  std::string grid;  ///< name in the input; a grid of vectors stands for its components
+  Goal goal;
+  std::size_t place = 0;  ///< of the grid in the input (resolveNames)
+};
+
 struct Options {
   std::filesystem::path input, output;
   cli::InputFiles inputs;
@@ -54,5 +63,21 @@ struct Options {
 /// \return nothing if --help or --version was printed
 /// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<Options> parseOptions(int argc, const char* const* argv);
+
+/// What `vdb2esvr --help` says, and the options that it has (command_line.cpp).
+[[nodiscard]] cli::CommandLine commandLine();
+
+/// Finds the places of the grids that options name.
+/// \throws BadInput  there is no grid of a name, or it is ambiguous; the text lists the grids
+/// \throws UsageError  two goals are those of one grid
+void resolveNames(const VdbSummary& input, Options& options);
+
+/// The index in Options::gridGoals of a grid's own goal, if it has one.
+[[nodiscard]] std::optional<std::size_t> ownGoalOf(const Options& options, const FittedGrid& grid);
+
+[[nodiscard]] const Goal& goalOf(const Options& options, const FittedGrid& grid);
+
+/// The PSNR that a grid should reach, dB over the box.
+[[nodiscard]] std::optional<double> wantedPsnrOf(const Options& options, const FittedGrid& grid);
 
 }  // namespace esvr::vdb2esvr

@@ -9,8 +9,8 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "cli/json_file.h"
-#include "cli/printable.h"
+#include "programs/files.h"
+#include "programs/messages.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -5,9 +5,9 @@
 #include <chrono>
 #include <string>
 
-#include "cli/frame_range.h"
-#include "cli/log.h"
 #include "esvr/fit.h"
+#include "programs/frames.h"
+#include "programs/messages.h"
 
 namespace esvr::vdb2esvr {
 

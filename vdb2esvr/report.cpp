@@ -1,20 +1,358 @@
+// The JSON reports of --report: what was asked for, the grids, a run, and a sequence.
 #include "vdb2esvr/report.h"
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
-#include "cli/json_file.h"
-#include "cli/memory.h"
-#include "cli/names.h"
-#include "cli/version_json.h"
+#include "esvr/coord.h"
 #include "esvr/grid_names.h"
-#include "vdb2esvr/asked_report.h"
-#include "vdb2esvr/grid_report.h"
+#include "programs/files.h"
+#include "programs/help_text.h"
+#include "programs/memory.h"
+#include "programs/names.h"
+#include "vdb2esvr/left_out.h"
+#include "vdb2esvr/paper.h"
 
 namespace esvr::vdb2esvr {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
+template <class T>
+Json orNull(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+/// The first and the last voxel of a box: x, y, z, x, y, z. Null if it is empty.
+Json toJson(const Box& box) {
+  if (box.empty()) return nullptr;
+  return {box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z};
+}
+
+// What was asked for.
+
+const char* nameOf(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return "draft";
+    case Preset::kHigh:
+      return "high";
+    case Preset::kStandard:
+      break;
+  }
+  return "standard";
+}
+
+const char* nameOf(Activity activity) {
+  switch (activity) {
+    case Activity::kExact:
+      return "exact";
+    case Activity::kByValue:
+      return "threshold";
+    case Activity::kAuto:
+    case Activity::kNoMask:
+      break;
+  }
+  return "auto";
+}
+
+const char* nameOf(Representation representation) {
+  switch (representation) {
+    case Representation::kEllipsoids:
+      return "ellipsoids";
+    case Representation::kVoxels:
+      return "voxels";
+    case Representation::kAuto:
+      break;
+  }
+  return "auto";
+}
+
+/// The wanted bound on the error.
+Json maxErrorOf(const Goal& goal) {
+  const auto* within = std::get_if<BoundGoal>(&goal);
+  return within ? Json(within->bound) : Json(nullptr);
+}
+
+bool isShare(const Goal& goal) {
+  const auto* within = std::get_if<BoundGoal>(&goal);
+  return within && within->relative;
+}
+
+/// The goals of single grids.
+Json goalsOf(const std::vector<GridGoal>& goals) {
+  Json list = Json::array();
+  for (const GridGoal& own : goals) {
+    const auto* psnr = std::get_if<PsnrGoal>(&own.goal);
+    list.push_back({{"grid", own.grid},
+                    {"psnr", psnr ? Json(psnr->psnr) : Json(nullptr)},
+                    {"max_error", maxErrorOf(own.goal)},
+                    {"max_error_is_share", isShare(own.goal)}});
+  }
+  return list;
+}
+
+}  // namespace
+
+Json askedJson(const Options& options) {
+  const FitOptions& fit = options.convert.fit;
+  const StorageOptions& storage = options.convert.storage;
+  return {{"count", orNull(fit.count)},
+          {"psnr", orNull(options.psnr)},
+          {"size", orNull(options.size)},
+          {"ratio", orNull(options.ratio)},
+          {"lossless", std::holds_alternative<LosslessGoal>(options.convert.goal)},
+          {"max_error", maxErrorOf(options.convert.goal)},
+          {"max_error_is_share", isShare(options.convert.goal)},
+          {"representation", nameOf(options.convert.representation)},
+          {"goals", goalsOf(options.gridGoals)},
+          {"share", options.shares ? "auto" : "off"},
+          {"seconds", orNull(fit.seconds)},
+          {"iterations", orNull(fit.iterations)},
+          {"method", options.paper ? "paper" : "default"},
+          {"preset", nameOf(fit.preset)},
+          {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
+          {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
+          {"topology", nameOf(storage.activity)},
+          {"keep", options.grids.keep},
+          {"skip", options.grids.skip},
+          {"seed", fit.seed},
+          {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
+          {"device", options.device},
+          {"max_vram", orNull(fit.maxDeviceBytes)},
+          {"chunk_voxels", orNull(fit.chunkVoxels)}};
+}
+
+// A grid.
+
+namespace {
+
+const char* nameOf(FitEnd end) {
+  switch (end) {
+    case FitEnd::kScheduleDone:
+      return "schedule done";
+    case FitEnd::kPsnrReached:
+      return "psnr reached";
+    case FitEnd::kTimeUp:
+      return "time up";
+    case FitEnd::kCancelled:
+      return "interrupted";
+    case FitEnd::kPsnrMissed:
+      return "psnr missed";
+  }
+  return "";
+}
+
+/// The inactive values that the file does not hold; null if there is none.
+Json inactiveOf(const InactiveValues& values) {
+  if (values.count() == 0) return nullptr;
+  const bool hasRange = values.count() > values.nonFinite();
+  return {{"count", values.count()},
+          {"value_range", hasRange ? Json{values.min(), values.max()} : Json(nullptr)},
+          {"nonfinite", values.nonFinite()}};
+}
+
+Json sourceOf(const ConvertedGrid& grid) {
+  const StoredGrid& stored = grid.stored();
+  return {{"class", className(stored.descriptor.gridClass)},
+          {"value_type", cli::nameOf(stored.descriptor.valueType)},
+          {"background", stored.descriptor.background},
+          {"map", stored.descriptor.transform.mapType},
+          {"active_voxels", stored.activeVoxels},
+          {"active_box", toJson(stored.activeBox)},
+          {"bricks", grid.bricks},
+          {"value_range", {stored.valueMin, stored.valueMax}},
+          {"nonfinite_replaced", grid.nonFiniteReplaced},
+          {"inactive_lost", inactiveOf(grid.inactive)}};
+}
+
+Json kernelOf(const Kernel& kernel) {
+  return {{"form", cli::nameOf(kernel.form)}, {"kappa", kernel.kappa}, {"epsilon", kernel.epsilon}};
+}
+
+/// How the file says which voxels are active. A threshold without bound has no meaning.
+Json topologyOf(const RunRecord& record, std::size_t g) {
+  const StoredGrid& grid = record.grids[g].stored();
+  const bool byThreshold = !grid.voxels && (grid.topology == TopologyKind::kThreshold ||
+                                            grid.topology == TopologyKind::kBricks);
+  return {{"kind", grid.voxels ? "voxels" : cli::nameOf(grid.topology)},
+          {"threshold", byThreshold ? Json(grid.activeThreshold) : Json(nullptr)},
+          {"bricks", grid.bricks.size()},
+          {"mask_bytes", bytesOf(record.output, g, "mask")},
+          {"level_bytes", bytesOf(record.output, g, "levels")}};
+}
+
+Json fitOf(const ConvertedGrid& grid) {
+  const FitResult& fit = grid.conversion.fit;
+  return {{"end", nameOf(fit.end)},
+          {"wanted", fit.wanted},
+          {"device", grid.device},
+          {"device_bytes", fit.deviceBytes},
+          {"device_full", fit.deviceFull},
+          {"chunks", fit.chunks},
+          {"pairs", fit.pairs}};
+}
+
+Json candidateOf(const std::optional<Candidate>& candidate) {
+  if (!candidate) return nullptr;
+  return {{"bytes", candidate->bytes},
+          {"psnr_box", orNull(candidate->psnr)},
+          {"estimated", candidate->estimated}};
+}
+
+const char* representationOf(const StoredGrid& grid) {
+  if (grid.voxels) return "voxels";
+  return grid.residual ? "ellipsoids and residual" : "ellipsoids";
+}
+
+Json choiceOf(const ConvertedGrid& grid) {
+  const ChoiceRecord choice = grid.conversion.choice.value_or(ChoiceRecord{});
+  return {{"stored", representationOf(grid.stored())},
+          {"voxels", candidateOf(choice.voxels)},
+          {"ellipsoids", candidateOf(choice.ellipsoids)}};
+}
+
+Json compactOf(const ConvertedGrid& grid) {
+  if (!grid.conversion.compact) return nullptr;
+  const auto& [loss, steps] = *grid.conversion.compact;
+  const StreamBytes bytes = streamBytes(grid.stored());
+  return {{"loss_db", loss},
+          {"steps",
+           {{"positions", steps.position},
+            {"scales", steps.scale},
+            {"rotations", steps.rotation},
+            {"intensities", steps.intensity}}},
+          {"bytes",
+           {{"positions", bytes.positions},
+            {"scales", bytes.scales},
+            {"rotations", bytes.rotations},
+            {"intensities", bytes.intensities}}}};
+}
+
+/// The errors of the first importance layers.
+Json layersOf(const StoredGrid& grid) {
+  Json layers = Json::array();
+  const auto sizes = layerSizes(grid);
+  LayerSize sum;
+  for (std::size_t k = 0; k < grid.layerErrors.size(); ++k) {
+    sum.ellipsoids += sizes[k].ellipsoids;
+    sum.bytes += sizes[k].bytes;
+    layers.push_back({{"ellipsoids", sum.ellipsoids},
+                      {"bytes", sum.bytes},
+                      {"psnr_box", grid.layerErrors[k].psnrBox},
+                      {"max_error", grid.layerErrors[k].maxError}});
+  }
+  return layers;
+}
+
+/// The errors of the surface of a narrow band; other grids have none.
+Json surfaceOf(const std::optional<SurfaceErrors>& surface) {
+  Json distance = nullptr;
+  if (surface && surface->distance)
+    distance = {{"voxels", surface->distance->voxels}, {"world", surface->distance->world}};
+  return {{"sign_errors", surface ? Json(surface->signs.voxels) : Json(nullptr)},
+          {"mesh_distance", std::move(distance)}};
+}
+
+Json sectionsOf(const EsvrSummary& file, std::size_t grid) {
+  Json sections = Json::array();
+  for (const auto& s : file.sections)
+    if (s.grid == grid)
+      sections.push_back({{"kind", s.kind},
+                          {"codec", s.codec},
+                          {"bytes", s.storedBytes},
+                          {"raw_bytes", s.rawBytes},
+                          {"shared", s.sharedWith.has_value()}});
+  return sections;
+}
+
+Json curveOf(const std::vector<TimedCurvePoint>& curve) {
+  Json points = Json::array();
+  for (const auto& p : curve)
+    points.push_back({{"seconds", p.seconds},
+                      {"iteration", p.iteration},
+                      {"ellipsoids", p.ellipsoids},
+                      {"psnr_box", p.psnrBox},
+                      {"psnr_active", p.psnrActive},
+                      {"max_error", p.maxError}});
+  return points;
+}
+
+/// What a grid gains by other grids of the file.
+Json sharedOf(const ConvertedGrid& grid) {
+  if (!grid.shared) return nullptr;
+  const SharedBytes& shared = *grid.shared;
+  return {{"with", shared.with.empty() ? Json(nullptr) : Json(shared.with)},
+          {"bytes_with", shared.bytesWith},
+          {"bytes_without", shared.bytesWithout},
+          {"seconds", shared.seconds}};
+}
+
+/// The parts that the file does without. A figure that is not known has no key.
+Json leftOutOf(const RunRecord& record, std::size_t g) {
+  Json list = Json::array();
+  for (const LeftOut& note : leftOut(record, g)) {
+    Json entry{{"part", note.part}, {"why", note.why}, {"used", note.used}};
+    if (note.bytesWith) entry["bytes_with"] = *note.bytesWith;
+    if (note.bytesWithout) entry["bytes_without"] = *note.bytesWithout;
+    if (note.seconds) entry["seconds"] = *note.seconds;
+    list.push_back(entry);
+  }
+  return list;
+}
+
+Json metricsJson(const VolumeMetrics& m) {
+  return {{"peak", m.peak},
+          {"box_voxels", m.boxVoxels},
+          {"psnr_box", m.psnrBox},
+          {"psnr_active", m.psnrActive},
+          {"max_error", m.maxError},
+          {"max_error_at", {m.maxErrorAt.x, m.maxErrorAt.y, m.maxErrorAt.z}},
+          {"p999_error", m.p999Error},
+          {"iou", m.iou},
+          {"mass_reference", m.massReference},
+          {"mass", m.massCandidate}};
+}
+
+Json secondsJson(const PhaseSeconds& s) {
+  return {{"read", s.read},
+          {"seed", s.seed},
+          {"optimise", s.optimise},
+          {"encode", s.encode},
+          {"measure", s.measure}};
+}
+
+Json gridJson(const RunRecord& record, std::size_t g) {
+  const ConvertedGrid& grid = record.grids[g];
+  return {{"name", grid.uniqueName},
+          {"component_of", grid.id.component ? Json(grid.sourceName) : Json(nullptr)},
+          {"same_as", grid.twinOf ? Json(grid.sameAs) : Json(nullptr)},
+          {"shared", sharedOf(grid)},
+          {"source", sourceOf(grid)},
+          {"ellipsoids", grid.stored().field.ellipsoidCount()},
+          {"bytes", cli::ownBytes(record.output, g)},
+          {"sections", sectionsOf(record.output, g)},
+          {"kernel", kernelOf(grid.stored().field.kernel)},
+          {"topology", topologyOf(record, g)},
+          {"fit", fitOf(grid)},
+          {"paper", grid.paper ? paperJson(*grid.paper) : Json(nullptr)},
+          {"compact", compactOf(grid)},
+          {"representation", choiceOf(grid)},
+          {"layers", layersOf(grid.stored())},
+          {"metrics", metricsJson(grid.metrics)},
+          {"surface", surfaceOf(grid.surface)},
+          {"seconds", secondsJson(grid.seconds)},
+          {"left_out", leftOutOf(record, g)},
+          {"curve", curveOf(grid.conversion.fit.curve)}};
+}
+
+// A run.
+
+/// The name and the version of a report's form. docs/report.md says when the version changes.
+struct ReportSchema {
+  const char* name;
+  int version;
+};
 constexpr ReportSchema kSchema{"esvr-report", 1};
 
 Json gridsOf(const RunRecord& record) {
@@ -100,12 +438,7 @@ const char* nameOf(ErrorKind kind) {
   return "failure";
 }
 
-}  // namespace
-
-bool reportIsFile(const Options& options) {
-  return !options.report.empty() && options.report != cli::kStandardOutput;
-}
-
+/// The first items of every report: program, versions and options.
 Json reportHead(const Options& options, const ReportSchema& schema) {
   return {{"schema", schema.name},
           {"schema_version", schema.version},
@@ -113,6 +446,12 @@ Json reportHead(const Options& options, const ReportSchema& schema) {
           {"command_line", options.commandLine},
           {"versions", cli::versionJson()},
           {"asked", askedJson(options)}};
+}
+
+}  // namespace
+
+bool reportIsFile(const Options& options) {
+  return !options.report.empty() && options.report != cli::kStandardOutput;
 }
 
 Json makeReport(const Options& options, const RunRecord& record) {
@@ -146,6 +485,91 @@ Json makeFailureReport(const Options& options, const Error& error) {
   report.update({{"input", {{"path", options.input.string()}}},
                  {"error", {{"kind", nameOf(error.kind())}, {"message", error.what()}}},
                  {"exit_code", error.exitCode()}});
+  return report;
+}
+
+// A sequence.
+
+namespace {
+
+constexpr ReportSchema kSequenceSchema{"esvr-sequence", 1};
+
+/// The items of a conversion's report that a sequence has once, or has for the whole run only.
+constexpr const char* kOfSequence[]{"schema",           "schema_version", "program",
+                                    "command_line",     "versions",       "asked",
+                                    "peak_memory_bytes"};
+
+Json outputOf(const FrameRecord& frame) {
+  const bool isThere = frame.bytesOut > 0;
+  return {{"path", frame.frame.output.string()},
+          {"bytes", isThere ? Json(frame.bytesOut) : Json(nullptr)}};
+}
+
+Json entryOf(const SequenceRecord& record, const FrameRecord& frame) {
+  Json entry{{"frame", frame.frame.number}, {"state", nameOf(frame.state)}};
+  entry["held_from"] =
+      frame.frame.holds ? Json(record.frames[*frame.frame.holds].frame.number) : Json(nullptr);
+  entry["input"] = {{"path", frame.frame.input.string()}};
+  entry["output"] = outputOf(frame);
+  entry["group"] = frame.group ? Json(*frame.group) : Json(nullptr);
+  entry["error"] = nullptr;
+  if (frame.report.is_object()) entry.update(frame.report);
+  return entry;
+}
+
+Json framesOf(const SequenceRecord& record) {
+  Json frames = Json::array();
+  for (const FrameRecord& frame : record.frames) frames.push_back(entryOf(record, frame));
+  return frames;
+}
+
+Json rangesOf(const SequenceRecord& record) {
+  Json grids = Json::array();
+  for (const GridRange& range : gridRanges(record))
+    grids.push_back({{"name", range.name},
+                     {"frames", range.frames},
+                     {"psnr_active", {range.lowestActive, range.highestActive}},
+                     {"psnr_box", {range.lowestBox, range.highestBox}}});
+  return grids;
+}
+
+/// The output of the whole run; a file of all frames has bytes and groups.
+Json outputOf(const Options& options, const SequenceRecord& record) {
+  Json output{{"path", options.output.string()}};
+  if (!record.file) return output;
+  output["bytes"] = record.file->bytes ? Json(*record.file->bytes) : Json(nullptr);
+  output["groups"] = record.file->groups;
+  return output;
+}
+
+Json countsOf(const SequenceRecord& record) {
+  Json counts;
+  for (const FrameState state :
+       {FrameState::kConverted, FrameState::kHeld, FrameState::kKept, FrameState::kMissing,
+        FrameState::kFailed, FrameState::kInterrupted, FrameState::kNotBegun})
+    counts[nameOf(state)] = framesIn(state, record).size();
+  return counts;
+}
+
+}  // namespace
+
+Json frameReport(Json conversion) {
+  for (const char* item : kOfSequence) conversion.erase(item);
+  return conversion;
+}
+
+Json makeSequenceReport(const Options& options, const SequenceRecord& record) {
+  const auto amiss = whatIsAmiss(record);
+  Json report = reportHead(options, kSequenceSchema);
+  report.update({{"input", {{"path", options.input.string()}}},
+                 {"output", outputOf(options, record)},
+                 {"states", countsOf(record)},
+                 {"grids", rangesOf(record)},
+                 {"frames", framesOf(record)},
+                 {"seconds", record.seconds},
+                 {"peak_memory_bytes", cli::peakMemory()},
+                 {"interrupted", record.interrupted},
+                 {"exit_code", amiss ? amiss->exitCode() : 0}});
   return report;
 }
 

@@ -1,30 +1,29 @@
 #pragma once
-/// The JSON report of --report, which docs/report.md describes.
+/// The JSON reports of --report, which docs/report.md describes.
 
 #include <nlohmann/json_fwd.hpp>
 
 #include "esvr/error.h"
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/run_record.h"
+#include "vdb2esvr/records.h"
 
 namespace esvr::vdb2esvr {
 
-/// The name and the version of a report's form. docs/report.md says when the version changes.
-struct ReportSchema {
-  const char* name;
-  int version;
-};
+/// The options that affect the conversion, with those of its speed (`asked` in the report).
+[[nodiscard]] nlohmann::ordered_json askedJson(const Options& options);
 
 [[nodiscard]] nlohmann::ordered_json makeReport(const Options& options, const RunRecord& record);
 
 /// True if the options want a report in a file.
 [[nodiscard]] bool reportIsFile(const Options& options);
 
-/// The first items of every report: program, versions and options.
-/// \param schema  its name and its version
-[[nodiscard]] nlohmann::ordered_json reportHead(const Options& options, const ReportSchema& schema);
-
 /// The report of a run that failed: its options and the error.
 [[nodiscard]] nlohmann::ordered_json makeFailureReport(const Options& options, const Error& error);
+
+/// The report of a frame from that of its conversion, without what all frames have in common.
+[[nodiscard]] nlohmann::ordered_json frameReport(nlohmann::ordered_json conversion);
+
+[[nodiscard]] nlohmann::ordered_json makeSequenceReport(const Options& options,
+                                                        const SequenceRecord& record);
 
 }  // namespace esvr::vdb2esvr

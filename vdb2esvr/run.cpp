@@ -1,36 +1,131 @@
+// The main function of vdb2esvr after its options are read: one file.
 #include "vdb2esvr/run.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <future>
 #include <iostream>
+#include <iterator>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <system_error>
 #include <utility>
+#include <vector>
 
-#include "cli/interrupts.h"
-#include "cli/json_file.h"
-#include "cli/names.h"
-#include "cli/output.h"
-#include "cli/stopwatch.h"
-#include "cli/table.h"
-#include "cli/thread_limit.h"
 #include "esvr/device.h"
+#include "esvr/device_workers.h"
 #include "esvr/error.h"
+#include "esvr/part_store.h"
+#include "esvr/rank_workers.h"
+#include "esvr/ranks.h"
+#include "programs/files.h"
+#include "programs/help_text.h"
+#include "programs/messages.h"
+#include "programs/names.h"
+#include "programs/run_main.h"
+#include "programs/workers.h"
 #include "vdb2esvr/byte_shares.h"
 #include "vdb2esvr/choose_grids.h"
-#include "vdb2esvr/parts.h"
+#include "vdb2esvr/convert.h"
+#include "vdb2esvr/options.h"
 #include "vdb2esvr/progress_bar.h"
+#include "vdb2esvr/records.h"
 #include "vdb2esvr/report.h"
-#include "vdb2esvr/run_record.h"
 #include "vdb2esvr/run_sequence.h"
 #include "vdb2esvr/share.h"
-#include "vdb2esvr/source.h"
 #include "vdb2esvr/summary.h"
 #include "vdb2esvr/twins.h"
 #include "vdb2esvr/vectors.h"
 
 namespace esvr::vdb2esvr {
 namespace {
+
+namespace fs = std::filesystem;
+
+// Where the parts of fits in chunks run (docs/scale.md).
+
+/// The folder of a run's finished parts: that of OUT.esvr is OUT.esvr.parts.
+fs::path partsFolder(const Options& options) { return options.output.string() + ".parts"; }
+
+/// The properties of the input file that change with its content.
+void addInput(const fs::path& input, std::vector<PartOrigin>& origin) {
+  std::error_code error;
+  const fs::path path = fs::canonical(input, error);
+  if (error) throw BadInput("cannot read " + input.string() + ": " + error.message());
+  const auto changed = fs::last_write_time(path).time_since_epoch().count();
+  origin.push_back({"input", path.string()});
+  origin.push_back({"input's size", std::to_string(fs::file_size(path))});
+  origin.push_back({"input's time of change", std::to_string(changed)});
+}
+
+std::vector<PartOrigin> originOf(const Options& options, const Device& device) {
+  std::vector<PartOrigin> origin{{"version", cli::programVersion()}};
+  addInput(options.input, origin);
+  const auto asked = askedJson(options);
+  for (const auto& [name, value] : asked.items())
+    if (name != "threads" && name != "device") origin.push_back({name, value.dump()});
+  std::string grids;
+  for (const auto& grid : options.grids.only) grids += '"' + grid + '"';
+  origin.push_back({"grids", grids});
+  origin.push_back({"kind of device", device.kind == DeviceKind::kCpu ? "CPU" : "GPU"});
+  return origin;
+}
+
+/// Each GPU twice: while it fits a part, the next one is prepared on the host.
+std::vector<Device> withPreparation(const std::vector<Device>& devices) {
+  std::vector<Device> workers = devices;
+  std::ranges::copy_if(devices, std::back_inserter(workers),
+                       [](const Device& device) { return device.kind == DeviceKind::kCuda; });
+  return workers;
+}
+
+/// Runs the parts on devices or ranks, and keeps those that are finished for --resume.
+class Parts {
+ public:
+  /// Opens the folder of finished parts for --resume.
+  /// \param device  the device that fits parts
+  /// \param ranks   the processes that share the parts; may be null
+  /// \throws BadInput  the folder belongs to another input, to other options or to fits on another
+  ///                   kind of device
+  Parts(const Options& options, const Device& device, Ranks* ranks);
+
+  /// \param devices  the devices that fit parts; the runner is valid until the next call
+  /// \param onLost   is told when one of several devices fails
+  [[nodiscard]] PartRunner* runOn(const std::vector<Device>& devices, LostDevice onLost);
+
+  /// True if the parts are shared with the ranks of MPI, which must all do the same.
+  [[nodiscard]] bool haveRanks() const { return ranks_ != nullptr; }
+
+  /// Removes the folder.
+  void remove();
+
+ private:
+  Ranks* ranks_;
+  std::optional<PartStore> store_;
+  std::unique_ptr<PartRunner> runner_;
+};
+
+Parts::Parts(const Options& options, const Device& device, Ranks* ranks) : ranks_(ranks) {
+  if (!options.resume) return;
+  store_.emplace(partsFolder(options), originOf(options, device),
+                 ranks ? PartStore::Access::kShared : PartStore::Access::kAlone);
+}
+
+PartRunner* Parts::runOn(const std::vector<Device>& devices, LostDevice onLost) {
+  PartStore* const store = store_ ? &*store_ : nullptr;
+  if (ranks_)
+    runner_ = std::make_unique<RankWorkers>(*ranks_, devices, store);
+  else
+    runner_ = std::make_unique<DeviceWorkers>(withPreparation(devices), std::move(onLost), store);
+  return runner_.get();
+}
+
+void Parts::remove() {
+  if (store_) store_->remove();
+}
+
+// A run.
 
 void checkFiles(const Options& options) {
   cli::requireSeparate(options.inputs.paths, {options.output, options.report});

@@ -3,12 +3,12 @@
 
 #include <functional>
 
-#include "cli/log.h"
 #include "esvr/container.h"
 #include "esvr/progress.h"
 #include "esvr/ranks.h"
+#include "programs/messages.h"
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/run_record.h"
+#include "vdb2esvr/records.h"
 
 namespace esvr::vdb2esvr {
 

@@ -4,9 +4,9 @@
 #include <utility>
 #include <variant>
 
-#include "cli/stopwatch.h"
 #include "esvr/error.h"
 #include "esvr/voxel_reference.h"
+#include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {
 namespace {

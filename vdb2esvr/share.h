@@ -7,7 +7,7 @@
 #include "esvr/container.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/run_record.h"
+#include "vdb2esvr/records.h"
 
 namespace esvr::vdb2esvr {
 

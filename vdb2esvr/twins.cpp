@@ -5,9 +5,9 @@
 #include <tuple>
 #include <utility>
 
-#include "cli/stopwatch.h"
 #include "esvr/convert.h"
-#include "vdb2esvr/source.h"
+#include "programs/run_main.h"
+#include "vdb2esvr/convert.h"
 
 namespace esvr::vdb2esvr {
 namespace {

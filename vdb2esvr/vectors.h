@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/run_record.h"
+#include "vdb2esvr/records.h"
 
 namespace esvr::vdb2esvr {
 
