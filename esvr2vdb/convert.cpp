@@ -1,25 +1,144 @@
+// Writes a VDB from an .esvr file, and compares it with a reference.
+#include "esvr2vdb/jobs.h"
+
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <filesystem>
+#include <iosfwd>
 #include <iostream>
 #include <optional>
+#include <ostream>
+#include <set>
 #include <span>
+#include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
-#include "cli/interrupts.h"
-#include "cli/names.h"
-#include "cli/output.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
 #include "esvr/level_of_detail.h"
-#include "esvr2vdb/choose_grids.h"
-#include "esvr2vdb/error_table.h"
-#include "esvr2vdb/jobs.h"
+#include "esvr/metrics.h"
+#include "esvr/vdb_io.h"
+#include "esvr/vector_grid.h"
+#include "esvr/vector_metrics.h"
+#include "programs/files.h"
+#include "programs/messages.h"
+#include "programs/names.h"
+#include "programs/run_main.h"
 
 namespace esvr::esvr2vdb {
+
+// Grids by their names.
+
+std::vector<ListedGrid> listedGrids(const EsvrFile& file) {
+  const GridNames names(namesInOrder(file));
+  std::vector<ListedGrid> grids;
+  for (const auto& grid : gridsInOrder(file))
+    grids.push_back({grid, names.unique(grids.size()), grids.size()});
+  return grids;
+}
+
 namespace {
+
+/// The named grids in file order; all grids if none is named.
+/// \param path  file name for error texts
+/// \throws BadInput  a grid does not exist, or its name is ambiguous; the text lists the grids
+std::vector<ListedGrid> chooseGrids(const std::filesystem::path& path, const EsvrFile& file,
+                                    const std::vector<std::string>& wanted) {
+  const auto all = listedGrids(file);
+  if (wanted.empty()) return all;
+  const GridNames names(namesInOrder(file));
+  std::set<std::size_t> places;  // a set, so that a grid that is named twice is written once
+  for (const auto& name : wanted) places.insert(names.findWhole(name, path));
+  std::vector<ListedGrid> chosen;
+  for (const std::size_t place : places) chosen.push_back(all[place]);
+  return chosen;
+}
+
+// The option --reference.
+
+/// A written grid and the grid of the reference that it is compared with.
+struct ComparedGrid {
+  std::string name;                                   ///< name in the .esvr file
+  std::array<std::string, kComponents> components{};  ///< their names, for vectors
+  std::size_t reference = 0;                          ///< place in the reference
+  std::size_t written = 0;                            ///< place in the output
+  bool isVector = false;
+};
+
+ReadOptions readingOf(const Options& options) {
+  return {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+}
+
+/// The two files of a comparison.
+struct ComparedFiles {
+  const Options& options;
+  VdbSummary written;
+
+  /// True if a written grid has no active voxel, which readGrid and readVector would refuse.
+  [[nodiscard]] bool isEmpty(const ComparedGrid& grid) const {
+    return written.grids.at(grid.written).activeVoxels == 0;
+  }
+};
+
+VolumeMetrics compare(const ComparedFiles& files, const ComparedGrid& grid) {
+  const Options& options = files.options;
+  const auto read = [&](const auto& path, std::size_t place) {
+    return readGrid(path, place, readingOf(options)).volume;
+  };
+  const SparseVolume reference = read(*options.reference, grid.reference);
+  const SparseVolume written =
+      files.isEmpty(grid) ? SparseVolume{} : read(options.output, grid.written);
+  return compareVolumes(reference, written, {.box = options.box, .ssim = true});
+}
+
+VectorMetrics compareVectorGrid(const ComparedFiles& files, const ComparedGrid& grid) {
+  const Options& options = files.options;
+  const auto read = [&](const auto& path, std::size_t place) {
+    return readVector(path, place, readingOf(options)).components;
+  };
+  const VectorVolume reference = read(*options.reference, grid.reference);
+  const VectorVolume written =
+      files.isEmpty(grid) ? VectorVolume{} : read(options.output, grid.written);
+  return compareVectors(reference, written, {.box = options.box, .ssim = true});
+}
+
+std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
+  return {name,
+          cli::decibels(m.psnrActive),
+          cli::decibels(m.psnrBox),
+          cli::shortNumber(m.maxError),
+          cli::shortNumber(m.p999Error),
+          cli::shortNumber(*m.ssim),
+          cli::shortNumber(m.iou),
+          cli::shortNumber(m.massReference),
+          cli::shortNumber(m.massCandidate)};
+}
+
+/// Adds a row, or for vectors one for their lengths and one for each component.
+void addRows(const ComparedFiles& files, const ComparedGrid& grid, cli::Table& table) {
+  if (!grid.isVector) return table.add(row(grid.name, compare(files, grid)));
+  const VectorMetrics metrics = compareVectorGrid(files, grid);
+  table.add(row(grid.name, metrics.magnitude));
+  for (std::size_t c = 0; c < kComponents; ++c)
+    table.add(row(grid.components[c], metrics.components[c]));
+}
+
+/// Compares the written grids with the reference and prints a table.
+/// \throws BadInput, MemoryExceeded  as for readGrid
+void printErrors(const Options& options, const std::vector<ComparedGrid>& grids,
+                 std::ostream& out) {
+  cli::Table table({"grid", "PSNR active", "PSNR box", "max error", "p99.9 error", "SSIM", "IoU",
+                    "mass ref", "mass"});
+  const ComparedFiles files{options, inspectVdb(options.output)};
+  for (const auto& grid : grids) addRows(files, grid, table);
+  table.print(out);
+}
+
+// A file.
 
 /// A grid that was decoded.
 using DecodedGrid = std::variant<VolumeGrid, VectorGrid>;

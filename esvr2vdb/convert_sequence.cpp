@@ -1,3 +1,6 @@
+// Writes a VDB for each frame of a sequence, on several threads.
+#include "esvr2vdb/jobs.h"
+
 #include <algorithm>
 #include <iostream>
 #include <map>
@@ -8,17 +11,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/failure.h"
-#include "cli/frame_messages.h"
-#include "cli/frame_output.h"
-#include "cli/frame_warnings.h"
-#include "cli/frame_workers.h"
-#include "cli/interrupts.h"
-#include "cli/memory_gate.h"
-#include "cli/output.h"
 #include "esvr/error.h"
 #include "esvr/sequence_file.h"
-#include "esvr2vdb/jobs.h"
+#include "programs/files.h"
+#include "programs/memory.h"
+#include "programs/run_main.h"
+#include "programs/sequence.h"
+#include "programs/workers.h"
 
 namespace esvr::esvr2vdb {
 namespace {

@@ -1,13 +1,49 @@
 #pragma once
-/// The jobs of esvr2vdb. Each throws an esvr::Error if it fails.
+/// The options and the jobs of esvr2vdb. Each job throws an esvr::Error if it fails.
 
+#include <filesystem>
 #include <iosfwd>
+#include <optional>
+#include <string>
+#include <vector>
 
-#include "cli/log.h"
+#include "esvr/container.h"
+#include "esvr/coord.h"
+#include "esvr/grid_coding.h"
 #include "esvr/progress.h"
-#include "esvr2vdb/options.h"
+#include "esvr/vdb_io.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
+#include "programs/sequence.h"
 
 namespace esvr::esvr2vdb {
+
+inline constexpr const char* kProgram = "esvr2vdb";
+
+enum class Job { kConvert, kList, kCheck };
+
+struct Options {
+  Job job = Job::kConvert;
+  std::filesystem::path input, output;
+  cli::InputFiles inputs;
+  /// The frames, if the input and the output are patterns. The reference is a pattern, too.
+  std::optional<cli::Sequence> sequence;
+  std::vector<std::string> grids;  ///< names of the grids; empty: all
+  DecodeOptions decode;
+  ReadPart part;                             ///< the part of the file that is read
+  std::optional<std::size_t> maxEllipsoids;  ///< keep those of each grid with the largest weight
+  WriteOptions write;
+  std::optional<std::filesystem::path> reference;
+  std::optional<Box> box;  ///< box of the PSNR against the reference
+  cli::HostMemory memory;  ///< memory that input may take
+  int threads = 0;         ///< number of threads; 0: all
+  cli::Verbosity verbosity = cli::Verbosity::kNormal;
+};
+
+/// True if the whole file is wanted.
+[[nodiscard]] bool readsAll(const Options& options);
+
+// Jobs.
 
 /// Writes the VDB. If there is a reference, prints the errors of the written grids.
 void convert(const Options& options);
@@ -30,21 +66,23 @@ void convertContent(const Options& options, const EsvrFile& file, const CancelTo
 ///                interrupted. Frames may have been written
 void convertSequence(const Options& options);
 
-/// Prints the grids of a file and, for an .esvr file, its sections. It evaluates no voxel.
+/// Prints the grids of a file and, for an .esvr file, its sections, or a row for each frame of a file or
+/// a pattern of files. It evaluates no voxel.
+/// \throws Error  the failure of the first frame that cannot be read, after the others were listed
 void list(const Options& options);
-
-/// Prints the frames of a file that holds a sequence.
-void listSequence(const Options& options);
-
-/// Prints a row for the file of each frame of a pattern.
-/// \throws Error  the failure of the first file that cannot be read, after the others were listed
-void listFrames(const Options& options, const cli::FramePattern& pattern);
-
-/// Prints the grids of a .vdb or .nvdb file.
-void listVdb(const Options& options);
 
 /// Reads the whole file, or those of all frames of a pattern, and prints OK.
 /// \throws BadInput  the file is damaged (the text says where, and names each frame that is lost)
 void check(const Options& options);
+
+/// A grid of a file and the name that --grid takes (GridNames::unique).
+struct ListedGrid {
+  GridOfFile grid;
+  std::string name;
+  std::size_t place = 0;  ///< number of grids before it in the file
+};
+
+/// All grids in file order.
+[[nodiscard]] std::vector<ListedGrid> listedGrids(const EsvrFile& file);
 
 }  // namespace esvr::esvr2vdb

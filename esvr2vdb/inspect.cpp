@@ -1,21 +1,121 @@
+// Lists what files hold (--list), and checks them (--check).
+#include "esvr2vdb/jobs.h"
+
 #include <algorithm>
+#include <filesystem>
 #include <iostream>
 #include <map>
+#include <optional>
+#include <string>
+#include <vector>
 
-#include "cli/listing.h"
-#include "cli/names.h"
-#include "cli/printable.h"
-#include "cli/table.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
-#include "esvr2vdb/choose_grids.h"
-#include "esvr2vdb/jobs.h"
+#include "programs/messages.h"
+#include "programs/names.h"
+#include "programs/sequence.h"
 
 namespace esvr::esvr2vdb {
 namespace {
+
+namespace fs = std::filesystem;
+
+// A VDB file.
+
+void printGrids(const VdbSummary& file) {
+  cli::Table table({"grid", "class", "values", "active voxels", "bytes"});
+  for (const auto& grid : file.grids)
+    table.add({grid.uniqueName, className(grid.gridClass), cli::valuesOf(grid),
+               cli::activeVoxelsOf(grid), std::to_string(grid.storedBytes)});
+  table.print(std::cout);
+}
+
+void printDetails(const VdbSummary& file) {
+  cli::printMetadata("file metadata", file.metadata, std::cout);
+  for (const auto& grid : file.grids) {
+    std::cout << cli::printable(grid.uniqueName) << ": active box " << cli::textOf(grid.activeBox);
+    if (!grid.skipReason.empty()) std::cout << "; " << cli::printable(grid.skipReason);
+    std::cout << '\n';
+  }
+}
+
+/// Prints the grids of a .vdb or .nvdb file.
+void listVdb(const Options& options) {
+  const VdbSummary file = inspectVdb(options.input);
+  std::cout << cli::printable(options.input.string()) << ": " << file.format << ", "
+            << file.fileBytes << " bytes" << (file.grids.empty() ? ", no grid" : "") << "\n\n";
+  printGrids(file);
+  if (options.verbosity != cli::Verbosity::kVerbose) return;
+  std::cout << '\n';
+  printDetails(file);
+}
+
+// A sequence.
+
+std::vector<std::string> rowOf(const SequenceFrame& frame) {
+  return {std::to_string(frame.number), std::to_string(frame.group), std::to_string(frame.bytes),
+          frame.dependsOnPrevious ? "frame before" : "-"};
+}
+
+/// The names of the grids of a file; "-" if it has none.
+std::string gridsIn(const fs::path& path, const Options& options) {
+  std::vector<std::string> names;
+  if (path.extension() == ".esvr") {
+    // The grids' records suffice, so that nothing is decoded.
+    ReadPart wanted{.limits = limitsOf(options)};
+    wanted.grids.emplace();
+    for (const ListedGrid& grid : listedGrids(readEsvrPart(path, wanted).file))
+      names.push_back(grid.name);
+  } else {
+    for (const GridSummary& grid : inspectVdb(path).grids) names.push_back(grid.uniqueName);
+  }
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text.empty() ? "-" : text;
+}
+
+/// Prints a row for the file of each frame of a pattern.
+void listFrames(const Options& options, const cli::FramePattern& pattern) {
+  const cli::Log log(kProgram, options.verbosity);
+  const cli::FrameListing listing = cli::framesOnDisk(pattern);
+  cli::Table table({"frame", "bytes", "grids"});
+  std::vector<cli::FrameNumber> failed;
+  std::optional<Error> first;
+  for (const cli::FrameNumber frame : listing.frames) {
+    const fs::path path = pattern.toRead(frame);
+    try {
+      std::string grids = gridsIn(path, options);
+      table.add({std::to_string(frame), std::to_string(fs::file_size(path)), std::move(grids)});
+    } catch (const Error& error) {
+      log.error("frame " + std::to_string(frame) + ": " + error.what());
+      if (!first) first = error;
+      failed.push_back(frame);
+    }
+  }
+  std::cout << cli::printable(pattern.text()) << ": " << listing.frames.size()
+            << " frames, a file each\n\n";
+  table.print(std::cout);
+  if (const std::string hint = listing.hint(); !hint.empty())
+    log.warning(pattern.text() + ": " + hint);
+  if (first) throw Error(first->kind(), cli::sentenceOn(failed, listing.frames.size(), "failed"));
+}
+
+/// Prints the frames of a file that holds a sequence.
+void listSequence(const Options& options) {
+  const SequenceReader reader(options.input);
+  const EsvrSummary summary = inspectEsvr(options.input);
+  std::cout << cli::printable(options.input.string()) << ": .esvr format " << summary.versionMajor
+            << '.' << summary.versionMinor << ", " << summary.fileBytes << " bytes, "
+            << reader.frames().size() << " frames in " << reader.groupCount() << " groups\n\n";
+  cli::Table table({"frame", "group", "bytes", "refers to"});
+  for (const SequenceFrame& frame : reader.frames()) table.add(rowOf(frame));
+  table.print(std::cout);
+}
+
+// An .esvr file.
 
 std::string textOf(const Kernel& kernel) {
   return cli::nameOf(kernel.form) + " " + cli::shortNumber(kernel.kappa);
@@ -266,6 +366,73 @@ void list(const Options& options) {
   printLayers(listing);
   std::cout << '\n';
   printDetails(listing);
+}
+
+// --check.
+
+namespace {
+
+/// \throws BadInput  with a line for each fault
+void throwFaults(const Options& options, const std::vector<SequenceFault>& faults,
+                 std::size_t frames) {
+  std::vector<cli::FrameNumber> lost;
+  std::string lines;
+  for (const SequenceFault& fault : faults) {
+    if (fault.frame) lost.push_back(*fault.frame);
+    lines += "\n  " + fault.text;
+  }
+  throw BadInput(options.input.string() + ": " +
+                 (lost.empty() ? "it is damaged, but no frame is lost"
+                               : cli::sentenceOn(lost, frames, "are lost")) +
+                 lines);
+}
+
+void checkFrames(const Options& options) {
+  const ReadLimits limits{options.memory.maxBytes, options.memory.voxels};
+  const std::size_t frames = SequenceReader(options.input, limits).frames().size();
+  const auto faults = checkSequence(options.input, limits);
+  if (!faults.empty()) throwFaults(options, faults, frames);
+  if (options.verbosity != cli::Verbosity::kQuiet)
+    std::cout << cli::printable(options.input.string()) << ": OK\n";
+}
+
+void checkFile(const Options& options) {
+  if (holdsSequence(options.input)) return checkFrames(options);
+  const std::string name = cli::printable(options.input.string());
+  const auto notes = checkEsvr(options.input, {options.memory.maxBytes, options.memory.voxels});
+  if (options.verbosity == cli::Verbosity::kQuiet) return;
+  for (const auto& note : notes) std::cout << name << ": note: " << cli::printable(note) << '\n';
+  std::cout << name << ": OK\n";
+}
+
+/// Checks the file of each frame.
+void checkFilesOf(const Options& options, const cli::FramePattern& pattern) {
+  const cli::Log log(kProgram, options.verbosity);
+  const cli::FrameListing listing = cli::framesOnDisk(pattern);
+  if (const std::string hint = listing.hint(); !hint.empty())
+    log.warning(pattern.text() + ": " + hint);
+  std::vector<cli::FrameNumber> failed;
+  std::optional<Error> first;
+  for (const cli::FrameNumber frame : listing.frames) {
+    Options own = options;
+    own.input = pattern.toRead(frame);
+    try {
+      checkFile(own);
+    } catch (const Error& error) {
+      log.error("frame " + std::to_string(frame) + ": " + error.what());
+      if (!first) first = error;
+      failed.push_back(frame);
+    }
+  }
+  if (first) throw Error(first->kind(), cli::sentenceOn(failed, listing.frames.size(), "failed"));
+}
+
+}  // namespace
+
+void check(const Options& options) {
+  if (const auto pattern = cli::FramePattern::ofInput(options.input.string()))
+    return checkFilesOf(options, *pattern);
+  checkFile(options);
 }
 
 }  // namespace esvr::esvr2vdb
