@@ -1,9 +1,13 @@
 // Plan: `esvr-compare check` is run as a separate process. Files of all three formats are compared
 // with their source. The tests check each limit, baselines, --fail-on, and the exit codes and
-// messages of refused input.
+// messages of refused input. `esvr-compare check` is run on files with grids that have no figures.
+// A missing, an extra and a retyped grid fail, equal bytes pass, and --ignore-grids excludes a
+// grid. Sequences with known errors are compared as a user does. The temporal PSNR must see errors
+// that change from frame to frame, and no others, and each frame must be compared with its own.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openvdb/io/File.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,9 +15,10 @@
 
 #include "cli/compare_fixture.h"
 #include "cli/converters.h"
-#include "cli/refusal.h"
+#include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/vdb_io.h"
+#include "vdb/empty_grid.h"
 
 namespace esvr {
 namespace {
@@ -402,6 +407,192 @@ TEST_F(CompareCheck, refusesABaselineThatChecksNothing) {
     expectRefused(bad, "tolerance");
   }
   EXPECT_EQ(check("ref.vdb", {"--baseline", at("base.json")}).exitCode, 0);
+}
+
+/// A folder with a source file of bool, int32, vec3s, points, density and empty grids.
+class CompareCarried : public test::FolderTest {
+ protected:
+  void SetUp() override {
+    test::writeMixedInput(at("ref.vdb"), {{.voxels = softBall({})}, {.name = "empty"}});
+  }
+  [[nodiscard]] test::ProgramRun check(const std::string& candidate,
+                                       std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {at("ref.vdb"), at(candidate)});
+    return test::compare("check", more);
+  }
+  void convert(std::vector<std::string> more = {}) const {
+    more.insert(more.begin(), {at("ref.vdb"), at("f.esvr"), "--lossless", "--force"});
+    const auto run = test::vdb2esvr(more);
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+};
+
+const std::vector<std::string> kStrict{"--max-error", "0", "--fail-on", "all"};
+
+TEST_F(CompareCarried, CarriedGridsAreEqualBitForBitInBothFormats) {
+  convert();
+  ASSERT_EQ(test::esvr2vdb({at("f.esvr"), at("back.vdb")}).exitCode, 0);
+  for (const char* candidate : {"f.esvr", "back.vdb"}) {
+    const auto run = check(candidate, kStrict);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_THAT(run.out, AllOf(HasSubstr("grid \"vec3s\": the same bytes (vec3s)"),
+                               HasSubstr("grid \"empty\": the same bytes (float)")));
+  }
+}
+
+TEST_F(CompareCarried, AGridWhoseVoxelsAreCarriedIsComparedByItsBytes) {
+  convert({"--keep", "density"});
+  const auto run = check("f.esvr", kStrict);
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("grid \"density\": the same bytes (float)"));
+}
+
+TEST_F(CompareCarried, AMissingGridFailsUnlessItIsIgnored) {
+  convert({"--skip", "vec3s", "--skip", "empty"});
+  const auto run = check("f.esvr");
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, AllOf(HasSubstr("\"vec3s\" is missing"), HasSubstr("\"empty\" is missing")));
+  EXPECT_EQ(check("f.esvr", {"--ignore-grids", "vec3s"}).exitCode, 4);
+  EXPECT_EQ(check("f.esvr", {"--ignore-grids", "vec3s", "--ignore-grids", "empty"}).exitCode, 0);
+}
+
+TEST_F(CompareCarried, AnExtraGridFailsUnlessItIsIgnored) {
+  test::writeMixedInput(
+      at("more.vdb"),
+      {{.voxels = softBall({})}, {.name = "empty"}, {.name = "fuel", .voxels = softBall({})}});
+  const auto run = check("more.vdb");
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("grid \"fuel\" is not in the reference"));
+  EXPECT_EQ(check("more.vdb", {"--ignore-grids", "fuel"}).exitCode, 0);
+}
+
+TEST_F(CompareCarried, ARetypedGridFailsUnlessItIsIgnored) {
+  const std::vector<InputGrid> grids{
+      {.voxels = softBall({})}, {.name = "empty"}, {.name = "x", .voxels = softBall({})}};
+  test::writeInput(at("floats.vdb"), {grids[2]});
+  for (const char* type : {"vec3s", "double"}) {
+    openvdb::io::File(at("other.vdb"))
+        .write({test::emptyGrid(std::string("Tree_") + type + "_5_4_3", "x")});
+    const auto run = test::compare("check", {at("floats.vdb"), at("other.vdb")});
+    EXPECT_EQ(run.exitCode, 4);
+    EXPECT_THAT(run.err, HasSubstr(std::string("of type ") + type + " in the candidate, float in"));
+  }
+  EXPECT_EQ(
+      test::compare("check", {at("floats.vdb"), at("other.vdb"), "--ignore-grids", "x"}).exitCode,
+      3)
+      << "nothing is left to compare";
+}
+
+TEST_F(CompareCarried, OtherBytesFail) {
+  const auto write = [&](const char* file, int number) {
+    const auto grid = test::emptyGrid("Tree_int32_5_4_3", "x");
+    grid->insertMeta("number", openvdb::Int32Metadata(number));
+    openvdb::io::File(at(file)).write({grid});
+  };
+  write("a.vdb", 1);
+  write("b.vdb", 2);
+  write("c.vdb", 1);
+  EXPECT_EQ(test::compare("check", {at("a.vdb"), at("c.vdb")}).exitCode, 0);
+  const auto run = test::compare("check", {at("a.vdb"), at("b.vdb")});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("grid \"x\": its bytes differ"));
+}
+
+TEST_F(CompareCarried, AnEmptyGridOfOtherBytesHasNoVoxelsEither) {
+  const auto write = [&](const char* file, std::vector<test::InputVoxel> voxels, float background) {
+    test::writeInput(at(file),
+                     {{.voxels = softBall({})},
+                      {.name = "e", .voxels = std::move(voxels), .background = background}});
+  };
+  write("a.vdb", {}, 0.0f);
+  write("b.vdb", {}, 2.0f);
+  write("c.vdb", softBall({}), 0.0f);
+  const auto empty = test::compare("check", {at("a.vdb"), at("b.vdb")});
+  EXPECT_EQ(empty.exitCode, 0) << empty.err;
+  EXPECT_THAT(empty.out, AllOf(HasSubstr("grid \"e\": no active voxel in either file"),
+                               HasSubstr("grid \"e\": background: 0, 2")));
+  EXPECT_EQ(test::compare("check", {at("a.vdb"), at("b.vdb"), "--fail-on", "all"}).exitCode, 4);
+  const auto full = test::compare("check", {at("a.vdb"), at("c.vdb")});
+  EXPECT_EQ(full.exitCode, 4);
+  EXPECT_THAT(full.err, HasSubstr("active voxels, the reference has none"));
+}
+
+TEST_F(CompareCarried, TablesTakeTheGridThatIsNotCarried) {
+  convert();
+  const auto run = test::compare("table", {at("ref.vdb"), at("f.esvr"), "--rows", "none"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("f.esvr"));
+  convert({"--keep", "density"});
+  const auto carried = test::compare("table", {at("ref.vdb"), at("f.esvr"), "--rows", "none"});
+  EXPECT_THAT(carried.out + carried.err, HasSubstr("is carried unchanged"));
+}
+
+using Json = nlohmann::json;
+using Words = std::vector<std::string>;
+
+/// Three frames of balls with the peaks 2, 3 and 4 as a.1.vdb, ...; b.#.vdb are brighter by a part.
+class SequenceCheck : public test::FolderTest {
+ protected:
+  void SetUp() override { writeFrames("a", {0.0f, 0.0f, 0.0f}); }
+  void writeFrames(const std::string& name, const std::vector<float>& brighter) const {
+    for (std::size_t i = 0; i < brighter.size(); ++i) {
+      auto voxels = test::softBall({}, float(i + 2));
+      for (auto& voxel : voxels) voxel.value += brighter[i];
+      test::writeInput(at(name + "." + std::to_string(i + 1) + ".vdb"), {{.voxels = voxels}});
+    }
+  }
+  [[nodiscard]] test::ProgramRun check(const std::string& candidate, Words more = {}) const {
+    more.insert(more.begin(), {"check", at("a.@.vdb"), at(candidate)});
+    return test::runProgram(ESVR_COMPARE, more);
+  }
+  void store(const std::string& frames) const {
+    const auto run = test::vdb2esvr(
+        {at("a.@.vdb"), at("a.esvr"), "--lossless", "--device", "cpu", "--frames", frames});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+};
+
+TEST_F(SequenceCheck, findsNoErrorInAFileThatHasEveryBit) {
+  store("1-3");
+  const auto run = check("a.esvr", {"--min-psnr-temporal", "300", "--report", at("r.json")});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("temporal"), HasSubstr("frame 3: density")));
+  const Json report = Json::parse(test::readText(at("r.json")));
+  ASSERT_EQ(report["grids"].size(), 3u);
+  EXPECT_FALSE(report["grids"][0].contains("psnr_temporal")) << "there is no frame before it";
+  EXPECT_TRUE(report["grids"][2]["psnr_temporal"].is_null()) << "infinite";
+  EXPECT_EQ(report["grids"][2]["frame"], 3);
+  EXPECT_EQ(report["bytes"], sizeOf("a.esvr"));
+}
+
+TEST_F(SequenceCheck, doesNotCountErrorsThatAllFramesShare) {
+  writeFrames("b", {0.25f, 0.25f, 0.25f});
+  EXPECT_EQ(check("b.@.vdb", {"--min-psnr-temporal", "100"}).exitCode, 0);
+  EXPECT_EQ(check("b.@.vdb", {"--min-psnr", "100"}).exitCode, 4);
+}
+
+TEST_F(SequenceCheck, countsErrorsThatChange) {
+  writeFrames("b", {0.25f, 0.25f, 0.5f});
+  const auto run = check("b.@.vdb", {"--min-psnr-temporal", "100"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("frame 3: grid \"density\": temporal"));
+  EXPECT_THAT(run.err, testing::Not(HasSubstr("frame 2: grid")));
+}
+
+TEST_F(SequenceCheck, namesFramesThatOnlyOneSequenceHas) {
+  store("1-2");
+  const auto run = check("a.esvr");
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("1 of 3 frames are not in " + at("a.esvr") + ": 3"));
+  EXPECT_EQ(check("a.esvr", {"--frames", "1-2"}).exitCode, 0);
+}
+
+TEST_F(SequenceCheck, refusesASingleFileBesideASequence) {
+  EXPECT_EQ(check("a.1.vdb").exitCode, 2);
+  const auto run = test::runProgram(
+      ESVR_COMPARE, {"check", at("a.1.vdb"), at("a.1.vdb"), "--min-psnr-temporal", "40"});
+  EXPECT_EQ(run.exitCode, 2);
+  EXPECT_THAT(run.err, HasSubstr("--min-psnr-temporal need sequences"));
 }
 
 }  // namespace

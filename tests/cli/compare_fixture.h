@@ -3,11 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/folder_test.h"
+#include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 
 namespace esvr::test {
@@ -26,5 +27,23 @@ class FittedBall : public FolderTest {
     ASSERT_EQ(quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
   }
 };
+
+/// The fields of each line. Quoted fields have neither quotes nor line feeds in these tests.
+inline std::vector<std::vector<std::string>> csvFields(const std::string& csv) {
+  std::vector<std::vector<std::string>> lines;
+  std::istringstream stream(csv);
+  for (std::string line; std::getline(stream, line);) {
+    auto& fields = lines.emplace_back(1);
+    bool quoted = false;
+    for (const char c : line) {
+      if (c == '"') quoted = !quoted;
+      if (c == ',' && !quoted)
+        fields.emplace_back();
+      else if (c != '"')
+        fields.back() += c;
+    }
+  }
+  return lines;
+}
 
 }  // namespace esvr::test

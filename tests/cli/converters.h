@@ -1,10 +1,14 @@
 #pragma once
 /// Runs the two converters as a user does.
 
+#include <gtest/gtest.h>
+
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "cli/run_program.h"
+#include "cli/vdb_inputs.h"
 
 namespace esvr::test {
 
@@ -28,5 +32,19 @@ inline ProgramRun quickFit(const std::string& input, const std::string& output,
 inline ProgramRun runOnFullDisk(const std::string& commandLine) {
   return runProgram("/bin/sh", {"-c", "ulimit -f 1; exec " + commandLine});
 }
+
+/// A folder with one valid input file.
+class Vdb2Esvr : public testing::Test {
+ protected:
+  void SetUp() override { writeInput(in(), {{.voxels = softBall({})}}); }
+  [[nodiscard]] std::string in() const { return folder_ / "in.vdb"; }
+  [[nodiscard]] std::string out() const { return folder_ / "out.esvr"; }
+  [[nodiscard]] ProgramRun fitQuickly(const std::vector<std::string>& more = {}) const {
+    return quickFit(in(), out(), more);
+  }
+  [[nodiscard]] bool outIsThere() const { return std::filesystem::exists(out()); }
+
+  TemporaryFolder folder_;
+};
 
 }  // namespace esvr::test

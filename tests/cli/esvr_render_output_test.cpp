@@ -1,24 +1,50 @@
 // Plan: the files that a separate process writes are read back with libpng, OpenEXR and a JSON
-// reader: pictures, distances, comparisons with a reference and measured speeds.
+// reader: pictures, distances, comparisons with a reference and measured speeds. A separate
+// process draws a blob with and without a color bar. The tests compare the pictures, and look for
+// the unit in the part of the picture that has the texts. A separate process draws turntables into
+// files, folders and videos. A script stands for ffmpeg and keeps the pixels or the arguments that
+// it gets. esvr-render is run with options that are wrong, with input that it cannot draw, and
+// with pictures that are too large. The tests check the exit code and the message.
 
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "cli/esvr_render_fixture.h"
-#include "cli/exr_channel.h"
 #include "esvr/transfer_function.h"
+#include "support/search_path.h"
 
 namespace esvr::test {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+
+/// One channel of an EXR, row after row.
+std::vector<float> readExr(const std::filesystem::path& path, const char* channel) {
+  Imf::InputFile file(path.c_str());
+  const Imath::Box2i window = file.header().dataWindow();
+  const std::size_t width = std::size_t(window.max.x) + 1, height = std::size_t(window.max.y) + 1;
+  EXPECT_NE(file.header().channels().findChannel(channel), nullptr);
+  std::vector<float> values(width * height);
+  Imf::FrameBuffer buffer;
+  buffer.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()),
+                                    sizeof(float), sizeof(float) * width));
+  file.setFrameBuffer(buffer);
+  file.readPixels(0, window.max.y);
+  return values;
+}
 
 TEST_F(EsvrRender, WritesAPictureOfTheSizeAskedForAndSaysSo) {
   const auto run = draw("in.esvr", "out.png");
@@ -130,6 +156,270 @@ TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {
   EXPECT_EQ(help.exitCode, 0);
   for (const auto& name : builtInColorMaps()) EXPECT_THAT(help.out, HasSubstr(name));
   for (const auto& name : builtInOpacities()) EXPECT_THAT(help.out, HasSubstr(name));
+}
+
+class EsvrRenderLegend : public EsvrRender {
+ protected:
+  /// A camera that is given, so that the bar does not move it.
+  static std::vector<std::string> withLegend(bool legend) {
+    std::vector<std::string> options{"--orthographic", "--height", "60", "--resolution",
+                                     "120x200",        "--step",   "4"};
+    if (legend) options.emplace_back("--legend");
+    return options;
+  }
+  /// Writes a file whose grid has one metadata item.
+  void writeGrid(const std::string& name, const MetaItem& item) {
+    VolumeGrid grid = readGrid(folder_ / "in.vdb", "density");
+    grid.descriptor.metadata = {item};
+    writeGrids(folder_ / name, {}, std::span(&grid, 1));
+  }
+};
+
+TEST_F(EsvrRenderLegend, IsDrawnAtTheRightEdge) {
+  const Pixels plain = picture("in.esvr", withLegend(false));
+  const Pixels bar = picture("in.esvr", withLegend(true));
+  EXPECT_NE(bar.rgba, plain.rgba);
+  for (int row = 0; row < 200; ++row)
+    for (int column = 0; column < 70; ++column)
+      ASSERT_TRUE(
+          std::equal(plain.at(column, row), plain.at(column, row) + 4, bar.at(column, row)));
+}
+
+/// True if a column of the right half shows nothing, between the volume and the bar.
+bool hasGap(const Pixels& picture) {
+  const int width = int(picture.header.width), height = int(picture.header.height);
+  for (int column = width / 2; column < width; ++column) {
+    bool empty = true;
+    for (int row = 0; row < height; ++row) empty &= picture.at(column, row)[3] == 0;
+    if (empty) return true;
+  }
+  return false;
+}
+
+TEST_F(EsvrRenderLegend, LeavesRoomForItself) {
+  const std::vector<std::string> opaque{"--legend", "--resolution", "200x200", "--opacity-length",
+                                        "0.01"};
+  EXPECT_TRUE(hasGap(picture("in.esvr", opaque)));
+  auto large = opaque;
+  large.insert(large.end(), {"--orthographic", "--height", "15"});
+  EXPECT_FALSE(hasGap(picture("in.esvr", large))) << "the volume lies behind the bar";
+}
+
+TEST_F(EsvrRenderLegend, ShowsTheUnitOfTheGrid) {
+  writeGrid("unit.vdb", stringItem("unit", "kg"));
+  writeGrid("units.vdb", stringItem("units", "kg"));
+  writeGrid("other.vdb", stringItem("note", "kg"));
+  const auto without = picture("in.vdb", withLegend(true)).rgba;
+  const auto unit = picture("unit.vdb", withLegend(true)).rgba;
+  EXPECT_NE(unit, without);
+  EXPECT_EQ(picture("units.vdb", withLegend(true)).rgba, unit);
+  EXPECT_EQ(picture("other.vdb", withLegend(true)).rgba, without);
+  EXPECT_EQ(picture("unit.vdb", withLegend(false)).rgba, picture("in.vdb", withLegend(false)).rgba);
+}
+
+TEST_F(EsvrRenderLegend, DoesNotCountInComparisons) {
+  const auto psnr = [&](bool legend) {
+    auto more = withLegend(legend);
+    more.insert(more.end(), {"--ref", folder_ / "in.vdb", "--report", folder_ / "r.json", "-f"});
+    EXPECT_EQ(draw("in.esvr", "out.png", more).exitCode, 0);
+    const auto report = nlohmann::json::parse(readText(folder_ / "r.json"));
+    return report["comparisons"][0]["psnr"].get<double>();
+  };
+  EXPECT_EQ(psnr(true), psnr(false));
+}
+
+TEST_F(EsvrRenderLegend, FitsIntoTinyPictures) {
+  for (const char* size : {"1x1", "16x16", "3x200", "200x3"})
+    EXPECT_EQ(draw("in.esvr", "out.png", {"--legend", "-f", "--resolution", size}).exitCode, 0)
+        << size;
+}
+
+TEST_F(EsvrRenderLegend, IsRefusedWhereItCannotBeDrawn) {
+  const auto exr = draw("in.esvr", "out.exr", {"--legend"});
+  EXPECT_EQ(exr.exitCode, 2);
+  EXPECT_THAT(exr.err, HasSubstr("--legend"));
+  EXPECT_EQ(runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--legend"}).exitCode, 2);
+}
+
+class EsvrRenderTurn : public EsvrRender {
+ protected:
+  void useFfmpeg(const std::string& script) { path_.add("ffmpeg", kOutputOfFfmpeg + script); }
+
+  SearchPath path_;
+};
+
+TEST_F(EsvrRenderTurn, AVideoHasThePicturesOfTheFiles) {
+  useFfmpeg("cat > \"$out\"");
+  const std::vector<std::string> turn{"--turntable", "3", "--background", "0,0,0"};
+  const auto run = draw("in.esvr", "turn.mp4", turn);
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("3 pictures, 0.1 s of video"));
+  std::string expected;
+  ASSERT_EQ(draw("in.esvr", "turn.png", turn).exitCode, 0);
+  for (const char* file : {"turn.0000.png", "turn.0001.png", "turn.0002.png"}) {
+    const Pixels picture = readPng(folder_ / file);
+    for (std::size_t i = 0; i < picture.rgba.size(); ++i)
+      if (i % 4 != 3) expected.push_back(char(picture.rgba[i]));
+  }
+  EXPECT_TRUE(readText(folder_ / "turn.mp4") == expected);
+}
+
+TEST_F(EsvrRenderTurn, FfmpegGetsTheRateAndTheCommandLine) {
+  useFfmpeg("cat > /dev/null; echo \"$@\" > \"$out\"");
+  ASSERT_EQ(draw("in.esvr", "turn.webm", {"--turntable", "2", "--fps", "12.5"}).exitCode, 0);
+  const std::string arguments = readText(folder_ / "turn.webm");
+  EXPECT_THAT(arguments, HasSubstr("-framerate 12.5 "));
+  EXPECT_THAT(arguments, HasSubstr("64x48"));
+  EXPECT_THAT(arguments, HasSubstr("turn.webm --turntable 2 --fps 12.5"));
+}
+
+TEST_F(EsvrRenderTurn, NothingIsLeftOfAVideoThatFails) {
+  useFfmpeg("cat > /dev/null; echo Unknown encoder >&2; exit 1");
+  const auto run = draw("in.esvr", "turn.mp4", {"--turntable", "2"});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("turn.mp4: ffmpeg: Unknown encoder"));
+  EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb"));
+}
+
+TEST_F(EsvrRenderTurn, AnInterruptedVideoLeavesNothing) {
+  useFfmpeg("exec sleep 60");
+  const auto run = runInterrupted(ESVR_RENDER, {folder_ / "in.esvr", folder_ / "turn.mp4",
+                                                "--turntable", "9999", "--resolution", "64x48"});
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr("interrupted; nothing was written"));
+  EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb"));
+}
+
+TEST_F(EsvrRenderTurn, AVideoWithoutFfmpegIsRefused) {
+  path_.hideOthers();
+  const auto run = draw("in.esvr", "turn.mp4", {"--turntable", "2"});
+  EXPECT_EQ(run.exitCode, 2);
+  EXPECT_THAT(run.err, HasSubstr("install"));
+}
+
+TEST_F(EsvrRenderTurn, WhatAVideoCannotBeIsRefused) {
+  useFfmpeg("cat > \"$out\"");
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    const auto run = draw("in.esvr", "turn.mp4", std::move(more));
+    EXPECT_EQ(run.exitCode, 2);
+    EXPECT_THAT(run.err, HasSubstr(why));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "turn.mp4"));
+  };
+  refused({}, "--turntable");
+  refused({"--turntable", "2", "--resolution", "63x48"}, "even");
+  refused({"--turntable", "2", "--bits", "16"}, "--bits");
+  refused({"--turntable", "2", "--ref", folder_ / "in.vdb"}, "--ref");
+  refused({"--turntable", "2", "--fps", "0"}, "--fps");
+  expectRefused({"--turntable", "2", "--fps", "30"}, 2, "--fps");
+}
+
+TEST_F(EsvrRenderTurn, APatternOrAFolderNamesThePictures) {
+  const std::vector<std::string> turn{"--turntable", "2"};
+  ASSERT_EQ(draw("in.esvr", "a_%02d_b.png", turn).exitCode, 0);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "a_00_b.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "a_01_b.png"));
+  ASSERT_EQ(draw("in.esvr", "new/", turn).exitCode, 0);
+  ASSERT_EQ(draw("in.esvr", "new", {"--turntable", "3", "--frames", "2-2"}).exitCode, 0);
+  for (const char* file : {"frame.0000.png", "frame.0001.png", "frame.0002.png"})
+    EXPECT_TRUE(std::filesystem::exists(folder_ / "new" / file)) << file;
+  EXPECT_EQ(draw("in.esvr", "new").exitCode, 2) << "a single picture needs a name";
+}
+
+TEST_F(EsvrRenderTurn, DistancesAreFilesBesideAVideo) {
+  useFfmpeg("cat > \"$out\"");
+  ASSERT_EQ(
+      draw("in.esvr", "turn.mp4", {"--turntable", "2", "--depth", folder_ / "z_%d.exr"}).exitCode,
+      0);
+  EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb", "turn.mp4", "z_0.exr", "z_1.exr"));
+}
+
+TEST_F(EsvrRender, OptionsThatMakeNoSenseAreRefused) {
+  expectRefused({"--resolution", "64"}, 2, "--resolution");
+  expectRefused({"--resolution", "0x4"}, 2, "--resolution");
+  expectRefused({"--resolution", "40000x4"}, 2, "32767");
+  expectRefused({"--step", "0"}, 2, "--step");
+  expectRefused({"--step", "-1"}, 2, "--step");
+  expectRefused({"--step", "nan"}, 2, "--step");
+  expectRefused({"--opacity-length", "0"}, 2, "--opacity-length");
+  expectRefused({"--colors", "jet"}, 2, "viridis");
+  expectRefused({"--opacity", "cubic"}, 2, "tent");
+  expectRefused({"--range", "3,1"}, 2, "LO <= HI");
+  expectRefused({"--range", "1"}, 2, "--range");
+  expectRefused({"--eye", "1,2"}, 2, "--eye");
+  expectRefused({"--eye", "1,2,nan"}, 2, "--eye");
+  expectRefused({"--eye", "0,9,0", "--center", "0,0,0", "--up", "0,1,0"}, 2, "up");
+  expectRefused({"--fov", "180"}, 2, "field of view");
+  expectRefused({"--fov", "20", "--orthographic"}, 2, "--fov");
+  expectRefused({"--height", "20"}, 2, "--orthographic");
+  expectRefused({"--background", "1,2,3"}, 2, "--background");
+  expectRefused({"--turntable", "0"}, 2, "--turntable");
+  expectRefused({"--preset", "x"}, 2, "--tf");
+  expectRefused({"--bits", "12"}, 2, "--bits");
+  expectRefused({"--mode", "minimum"}, 2, "maximum");
+  expectRefused({"--clip", "1,0,0,0,1,1"}, 2, "clip");
+  expectRefused({"--clip", "0,0,0,1,1,1", "--slice", "x=1"}, 2, "--slice");
+  expectRefused({"--slice", "w=1"}, 2, "--slice");
+  expectRefused({"--slice", "z="}, 2, "--slice");
+  expectRefused({"--frames", "0-1"}, 2, "--turntable");
+  expectRefused({"--turntable", "3", "--frames", "2-3"}, 2, "--frames");
+  expectRefused({"--depth", "z.png"}, 2, ".exr");
+  expectRefused({"--depth-parts", "17"}, 2, "--depth-parts");
+  expectRefused({"--values", "fp32"}, 2, "fp16");
+  expectRefused({"--sheet", "s.png"}, 2, "--ref");
+  expectRefused({"--min-transmittance", "1"}, 2, "transmittance");
+  expectRefused({"--device", "gpu"}, 2, "gpu");
+  expectRefused({"--bench"}, 2, "--bench");
+  expectRefused({"--report", "r.json"}, 2, "--ref");
+}
+
+TEST_F(EsvrRender, InputThatCannotBeDrawnIsRefused) {
+  expectRefused({"--grid", "none"}, 3, "density");
+  expectRefused({"--tf", folder_ / "missing.json"}, 3, "missing.json");
+  expectRefused({"--ref", folder_ / "missing.vdb"}, 3, "missing.vdb");
+  expectRefused({"--camera", folder_ / "missing.json"}, 3, "missing.json");
+  writeText(folder_ / "cam.json", R"({"eye": [1, 2]})");
+  expectRefused({"--camera", folder_ / "cam.json"}, 3, "three numbers");
+  writeText(folder_ / "cam.json", R"({"eyes": [1, 2, 3]})");
+  expectRefused({"--camera", folder_ / "cam.json"}, 3, "eyes");
+  EXPECT_EQ(draw("missing.esvr", "refused.png").exitCode, 3);
+  EXPECT_EQ(draw("missing.vdb", "refused.png").exitCode, 3);
+  writeText(folder_ / "bad.esvr", "nothing of the kind");
+  EXPECT_EQ(draw("bad.esvr", "refused.png").exitCode, 3);
+  EXPECT_EQ(draw("in.esvr", "refused.jpg").exitCode, 2);
+}
+
+TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
+  const auto large =
+      draw("in.esvr", "large.png", {"--resolution", "30000x30000", "--max-memory", "1GB"});
+  EXPECT_EQ(large.exitCode, 5);
+  EXPECT_THAT(large.err, AllOf(HasSubstr("30000 x 30000"), HasSubstr("43.2 GB")));
+  EXPECT_EQ(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}).exitCode, 2);
+}
+
+TEST_F(EsvrRender, TwoOutputsAreNeverOneFile) {
+  const std::vector<std::string> reference{"--ref", folder_ / "in.vdb"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), reference.begin(), reference.end());
+    return more;
+  };
+  expectRefused(with({"--sheet", folder_ / "refused.png"}), 2, "are one file");
+  expectRefused(with({"--sheet", folder_ / "refused.error.png"}), 2, "are one file");
+  std::filesystem::create_symlink(folder_ / "in.vdb", folder_ / "link.png");
+  expectRefused(with({"--sheet", folder_ / "link.png", "--force"}), 2, "are one file");
+}
+
+TEST_F(EsvrRender, APipeWithoutAWriterIsRefusedSlow) {
+  ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  expectRefused({"--camera", folder_ / "pipe"}, 3, "no program writes to it");
+  expectRefused({"--tf", folder_ / "pipe"}, 3, "no program writes to it");
+}
+
+TEST_F(EsvrRender, ACameraMayComeThroughAPipe) {
+  const auto run = runProgram(
+      "/bin/bash", {"-c", std::string(ESVR_RENDER) + " - " + (folder_ / "out.png").string() +
+                              " --resolution 16x16 --camera <(echo '{\"eye\": [1, 2, 90]}') < " +
+                              (folder_ / "in.esvr").string()});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
 }
 
 }  // namespace

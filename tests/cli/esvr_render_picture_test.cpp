@@ -1,9 +1,20 @@
 // Plan: a blob is drawn from an .esvr and from a .vdb file by a separate process. Pictures that
 // must be equal or alike are compared with each other, and so are pictures that an option must
-// change.
+// change. A separate process draws a blob from given places and on a turntable. The tests find the
+// blob in the pictures, and they compare pictures of one camera that is given in two ways. A
+// separate process draws a density together with a heat that has other voxels. The pictures of the
+// .esvr file and of the VDB file agree; each part of a look changes the picture; a grid that emits
+// hides nothing; what several grids do not have is refused. A separate process draws a blob by
+// each method. The folder golden/ has the expected pictures, with which the tests compare the
+// results.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "cli/esvr_render_fixture.h"
 #include "esvr/voxel_layer.h"
@@ -13,6 +24,7 @@ namespace esvr::test {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 
 TEST_F(EsvrRender, EllipsoidsLookLikeTheirVoxels) {
   // Bytes may differ by one. The background is black, because the color of an almost transparent
@@ -201,6 +213,204 @@ TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
 TEST_F(EsvrRender, TheNumberOfThreadsChangesNothing) {
   EXPECT_EQ(picture("in.esvr", {"--threads", "1"}).rgba, picture("in.esvr").rgba);
 }
+
+TEST_F(EsvrRender, TheMiddleOfTheVolumeIsInTheMiddleOfThePicture) {
+  for (const char* input : {"in.esvr", "in.vdb"}) {
+    EXPECT_GT(picture(input).at(32, 24)[3], 200) << input;
+    EXPECT_GT(picture(input, {"--orthographic"}).at(32, 24)[3], 200) << input;
+  }
+}
+
+TEST_F(EsvrRender, AGivenCameraIsTaken) {
+  const auto away = picture("in.esvr", {"--eye", "15,15,200", "--center", "15,15,400"});
+  for (const png_byte v : away.rgba) ASSERT_EQ(v, 0);
+  const auto seen =
+      picture("in.esvr", {"--eye", "-90,15,15", "--center", "15,15,15", "--up", "0,0,1"});
+  EXPECT_GT(seen.at(32, 24)[3], 0);
+}
+
+TEST_F(EsvrRender, ACameraFileIsReplacedByOptions) {
+  writeText(folder_ / "cam.json", R"({"eye": [-90, 15, 15], "center": [15, 15, 15],
+                                      "up": [0, 0, 1], "fov": 25})");
+  const auto file = picture("in.esvr", {"--camera", folder_ / "cam.json"});
+  const std::vector<std::string> same{"--eye", "-90,15,15", "--center", "15,15,15",
+                                      "--up",  "0,0,1",     "--fov",    "25"};
+  EXPECT_EQ(file.rgba, picture("in.esvr", same).rgba);
+  EXPECT_NE(picture("in.esvr", {"--camera", folder_ / "cam.json", "--fov", "50"}).rgba, file.rgba);
+  writeText(folder_ / "flat.json", R"({"height": 60})");
+  EXPECT_EQ(picture("in.esvr", {"--camera", folder_ / "flat.json"}).rgba,
+            picture("in.esvr", {"--orthographic", "--height", "60"}).rgba);
+}
+
+TEST_F(EsvrRender, ATurntableWritesAPictureForEveryAngle) {
+  ASSERT_EQ(draw("in.esvr", "turn.png", {"--turntable", "3"}).exitCode, 0);
+  EXPECT_THAT(folder_.names(),
+              ElementsAre("in.esvr", "in.vdb", "turn.0000.png", "turn.0001.png", "turn.0002.png"));
+  const auto first = readPng(folder_ / "turn.0000.png");
+  ASSERT_EQ(draw("in.esvr", "once.png", {"--turntable", "1"}).exitCode, 0);
+  EXPECT_EQ(first.rgba, readPng(folder_ / "once.0000.png").rgba) << "the same distance";
+  EXPECT_NE(first.rgba, readPng(folder_ / "turn.0001.png").rgba);
+}
+
+TEST_F(EsvrRender, SomeFramesOfATurntableAreThoseOfTheWhole) {
+  ASSERT_EQ(draw("in.esvr", "all.png", {"--turntable", "3"}).exitCode, 0);
+  ASSERT_EQ(draw("in.esvr", "part.png", {"--turntable", "3", "--frames", "1-1"}).exitCode, 0);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "part.0000.png"));
+  EXPECT_EQ(readPng(folder_ / "part.0001.png").rgba, readPng(folder_ / "all.0001.png").rgba);
+}
+
+class EsvrRenderGrids : public EsvrRender {
+ protected:
+  EsvrRenderGrids() {
+    const Field blob = readEsvr(folder_ / "in.esvr").grids.front().field;
+    const Field hot = heatField();
+    const SparseVolume density = revoxelise(blob, {}), heat = revoxelise(hot, {});
+    writeEsvr(folder_ / "two.esvr", {{},
+                                     {makeStoredGrid(named("density"), density, blob),
+                                      makeStoredGrid(named("heat"), heat, hot),
+                                      makeStoredGrid(named("moved", 2.0), heat, hot)}});
+    const std::vector<VolumeGrid> grids{{named("density"), density, 0}, {named("heat"), heat, 0}};
+    writeGrids(folder_ / "two.vdb", {}, grids);
+  }
+  static Field heatField() {
+    Field field = randomField({.count = 5,
+                               .extent = 16.0,
+                               .smallest = 4.0,
+                               .aspect = 2.0,
+                               .origin = {24, 0, 0},
+                               .seed = 3});
+    for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+    return field;
+  }
+  static GridDescriptor named(const std::string& name, double voxel = 0.5) {
+    GridDescriptor d = density();
+    d.name = name;
+    d.transform = uniformTransform(voxel);
+    return d;
+  }
+  Pixels with(const std::string& look, const std::string& file = "two.esvr") {
+    return picture(file, {"--with", look, "--opacity-length", "9", "--background", "0,0,0"});
+  }
+};
+
+TEST_F(EsvrRenderGrids, LookAlikeFromBothFiles) {
+  const auto run =
+      draw("two.esvr", "both.png",
+           {"--with", "heat", "--ref", folder_ / "two.vdb", "--report", folder_ / "r.json"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out + run.err, HasSubstr("density + heat"));
+  const auto report = nlohmann::json::parse(readText(folder_ / "r.json"));
+  // The stored threshold decides about a few faint voxels.
+  EXPECT_GT(report["comparisons"][0]["psnr"].get<double>(), 50.0);
+}
+
+TEST_F(EsvrRenderGrids, EachPartOfALookChangesThePicture) {
+  writeText(folder_ / "red.json",
+            R"([{"ColorSpace": "RGB", "Name": "Red", "RGBPoints": [0, 0.2, 0, 0, 1, 1, 0, 0]},
+                {"ColorSpace": "RGB", "Name": "Blue", "RGBPoints": [0, 0, 0, 0.2, 1, 0, 0, 1]}])");
+  const std::string tf = std::string("heat:tf=") + (folder_ / "red.json").string();
+  std::vector<Pixels> pictures{
+      picture("two.esvr", {"--opacity-length", "9", "--background", "0,0,0"})};
+  for (const std::string& look :
+       {std::string("heat"), std::string("heat:colors=viridis"), std::string("heat:opacity=tent"),
+        std::string("heat:range=0,0.3"), std::string("heat:emission"), tf, tf + ":preset=Blue",
+        tf + ":opacity=tent:emission"})
+    pictures.push_back(with(look));
+  for (std::size_t a = 0; a < pictures.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) EXPECT_NE(pictures[a].rgba, pictures[b].rgba) << a << b;
+}
+
+TEST_F(EsvrRenderGrids, EmissionIsThereInATransparentPicture) {
+  const std::vector<std::string> usual{"--opacity-length", "9"};
+  auto glowing = usual;
+  glowing.insert(glowing.end(), {"--with", "heat:emission"});
+  const Pixels plain = picture("two.esvr", usual), glow = picture("two.esvr", glowing);
+  // The fitted cameras differ by the box of the heat, so that only the sums are compared.
+  const auto lit = [](const Pixels& p) {
+    long sum = 0;
+    for (std::size_t i = 3; i < p.rgba.size(); i += 4) sum += p.rgba[i];
+    return sum;
+  };
+  EXPECT_GT(lit(glow), lit(plain));
+}
+
+TEST_F(EsvrRenderGrids, TheCameraSeesAllGrids) {
+  const auto edge = [&](const Pixels& p) {
+    bool lit = false;
+    for (int row = 0; row < int(p.header.height); ++row)
+      lit |= p.at(0, row)[3] > 0 || p.at(int(p.header.width) - 1, row)[3] > 0;
+    return lit;
+  };
+  EXPECT_FALSE(edge(picture("two.esvr", {"--with", "heat"})));
+}
+
+TEST_F(EsvrRenderGrids, AreRefusedWhereTheyCannotBeDrawn) {
+  const auto refused = [&](std::vector<std::string> more, int code, const std::string& why) {
+    const auto run = draw("two.esvr", "refused.png", std::move(more));
+    EXPECT_EQ(run.exitCode, code) << run.err;
+    EXPECT_THAT(run.err, HasSubstr(why));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "refused.png"));
+  };
+  refused({"--with", "cold"}, 3, "cold");
+  refused({"--with", "moved"}, 3, "different transforms");
+  refused({"--with", ""}, 2, "name of a grid");
+  refused({"--with", "heat:glow"}, 2, "'glow'");
+  refused({"--with", "heat:colors="}, 2, "'colors='");
+  refused({"--with", "heat:colors=jet"}, 2, "--with heat:colors=jet");
+  refused({"--with", "heat:range=2,1"}, 2, "LO <= HI");
+  refused({"--with", "heat", "--shade"}, 2, "--shade");
+  refused({"--with", "heat", "--mode", "maximum"}, 2, "--mode");
+  refused({"--with", "heat", "--between", "sum"}, 2, "--between");
+  refused({"--with", "heat", "--values", "float"}, 2, "--values");
+  refused({"--with", "heat", "--depth", folder_ / "z.exr"}, 2, "--depth");
+  refused({"--with", "heat", "--with", "heat", "--with", "heat", "--with", "heat"}, 2, "3 times");
+}
+
+/// The options with which the blob is drawn.
+struct Golden {
+  const char *name, *input;
+  std::vector<std::string> options;
+};
+std::ostream& operator<<(std::ostream& out, const Golden& golden) { return out << golden.name; }
+
+class GoldenPicture : public EsvrRender, public testing::WithParamInterface<Golden> {
+ protected:
+  [[nodiscard]] static std::filesystem::path golden() {
+    return std::string(ESVR_SOURCE_DIR "/tests/cli/golden/") + GetParam().name + ".png";
+  }
+};
+
+// Instruction sets differ by about 1e-6 of a value, which can change a channel by one level of 8
+// bits. A ray may also end one sample later, which changes a channel by at most 1/4096.
+// ESVR_UPDATE_GOLDEN=1 stores the pictures of this machine after an intended change.
+TEST_P(GoldenPicture, isDrawnAgain) {
+  auto options = GetParam().options;
+  options.insert(options.end(), {"--device", "cpu", "--resolution", "48x48"});
+  const Pixels found = picture(GetParam().input, options);
+  if (std::getenv("ESVR_UPDATE_GOLDEN"))
+    std::filesystem::copy_file(folder_ / "out.png", golden(),
+                               std::filesystem::copy_options::overwrite_existing);
+  const Pixels expected = readPng(golden());
+  ASSERT_EQ(found.rgba.size(), expected.rgba.size());
+  int largest = 0, visible = 0;
+  for (std::size_t i = 0; i < expected.rgba.size(); ++i) {
+    largest = std::max(largest, std::abs(int(found.rgba[i]) - int(expected.rgba[i])));
+    visible += expected.rgba[i] > 0;
+  }
+  EXPECT_LE(largest, 2);
+  EXPECT_GT(visible, 1000) << "an empty picture proves nothing";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Pictures, GoldenPicture,
+    testing::Values(Golden{"default", "in.esvr", {}}, Golden{"voxels", "in.vdb", {}},
+                    Golden{"sum", "in.esvr", {"--between", "sum", "--colors", "inferno"}},
+                    Golden{"tent", "in.esvr", {"--opacity", "tent"}},
+                    Golden{"post", "in.vdb", {"--classification", "post"}},
+                    Golden{"maximum", "in.esvr", {"--mode", "maximum", "--background", "1,1,1"}},
+                    Golden{"slice", "in.vdb", {"--slice", "z=15", "--opacity-length", "0.2"}},
+                    Golden{"orthographic", "in.esvr", {"--orthographic", "--eye", "15,15,90"}}),
+    [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
 }  // namespace esvr::test

@@ -15,9 +15,9 @@
 #include "cli/png_pixels.h"
 #include "cli/run_program.h"
 #include "esvr/device.h"
+#include "programs/page.h"
 #include "render/view/view_client.h"
 #include "render/view/view_files.h"
-#include "report/base64.h"
 #include "support/search_path.h"
 
 namespace esvr::test {

@@ -1,9 +1,13 @@
-// Plan: the options that all programs share are tested with every program.
+// Plan: the options that all programs share are tested with every program. The messages of the
+// dynamic linker (LD_DEBUG=files, ld.so(8)) name every library that a command loads or looks for.
+// Commands that need no device must not look for CUDA's driver; a conversion on a GPU must, which
+// shows that the messages are complete.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <ostream>
 #include <regex>
 #include <sstream>
@@ -12,8 +16,9 @@
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/folder_test.h"
+#include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
+#include "esvr/device.h"
 
 namespace esvr {
 namespace {
@@ -22,6 +27,7 @@ using test::softBall;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 struct ProgramCommand {
   const char* name;
@@ -125,6 +131,45 @@ INSTANTIATE_TEST_SUITE_P(
                                    {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o",
                                     "DIR/c", "--force"}}),
     [](const auto& tested) { return std::string(tested.param.name); });
+
+constexpr const char* kDriver = "libcuda.so";
+
+class Start : public test::FolderTest {
+ protected:
+  void SetUp() override {
+    test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  }
+
+  /// What the dynamic linker says about a run.
+  static std::string librariesOf(const char* program, const std::vector<std::string>& arguments) {
+    ::setenv("LD_DEBUG", "files", 1);
+    const auto run = test::runProgram(program, arguments);
+    ::unsetenv("LD_DEBUG");
+    EXPECT_THAT(run.err, HasSubstr("libstdc++")) << "the linker says nothing";
+    return run.err;
+  }
+};
+
+TEST_F(Start, doesNotLookForADriverWithoutADevice) {
+  for (const char* job : {"--list", "--check"})
+    EXPECT_THAT(librariesOf(ESVR2VDB, {job, at("in.esvr")}), Not(HasSubstr(kDriver))) << job;
+  EXPECT_THAT(librariesOf(ESVR2VDB, {"--list", at("in.vdb")}), Not(HasSubstr(kDriver)));
+  EXPECT_THAT(librariesOf(ESVR2VDB, {at("in.esvr"), at("back.vdb")}), Not(HasSubstr(kDriver)));
+  EXPECT_THAT(librariesOf(VDB2ESVR, {at("in.vdb"), at("o.esvr"), "--lossless", "--device", "cpu"}),
+              Not(HasSubstr(kDriver)));
+}
+
+TEST_F(Start, doesNotLookForADriverForHelp) {
+  for (const char* program : {VDB2ESVR, ESVR2VDB, ESVR_RENDER, ESVR_VIEW, ESVR_COMPARE})
+    EXPECT_THAT(librariesOf(program, {"--help"}), Not(HasSubstr(kDriver))) << program;
+}
+
+TEST_F(Start, looksForADriverOnlyIfTheBuildHasCuda) {
+  const auto libraries =
+      librariesOf(VDB2ESVR, {at("in.vdb"), at("o.esvr"), "--lossless", "--device", "cuda"});
+  EXPECT_EQ(libraries.find(kDriver) != std::string::npos, builtWithCuda());
+}
 
 }  // namespace
 }  // namespace esvr

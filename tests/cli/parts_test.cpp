@@ -1,5 +1,10 @@
-// Plan: a fit in chunks gives the same bytes in one run and in a run that was interrupted or killed
-// and continued. A folder of another run, of damaged parts, or of a running process is refused.
+// Plan: a fit in chunks gives the same bytes in one run and in a run that was interrupted or
+// killed and continued. A folder of another run, of damaged parts, or of a running process is
+// refused. A volume is converted, written back and compared by processes whose memory is limited
+// to a third of its voxels. `ulimit -d` limits the heap and all private memory of a process, but
+// not the files that it maps. The programs are run with so little memory that the voxels are in
+// files. The tests check that the results are the same, and that a folder which cannot hold the
+// files is refused by name.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,19 +13,24 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "cli/converters.h"
-#include "cli/folder_test.h"
+#include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/part_store.h"
+#include "esvr/vdb_io.h"
+#include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
 
-namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
+
+namespace fs = std::filesystem;
 
 class Parts : public test::FolderTest {
  protected:
@@ -147,6 +157,118 @@ TEST_F(Parts, followNoLinkInTheirFolder) {
     EXPECT_EQ(refused.exitCode, 1);
     EXPECT_THAT(refused.err, HasSubstr("not a regular file"));
     EXPECT_EQ(test::readText(at("precious")), "mine");
+  }
+}
+
+constexpr std::int32_t kSide = 66;        // bricks; the voxels take 589 MB
+constexpr const char* kLimit = "190000";  // KB
+constexpr const char* kMaxMemory = "100MB";
+
+/// A dense volume with a smooth field, in which no brick is constant.
+VolumeGrid denseGrid() {
+  VolumeGrid grid;
+  grid.descriptor.name = "density";
+  grid.descriptor.transform = uniformTransform(1.0);
+  SparseVolume& volume = grid.volume;
+  for (std::int32_t x = 0; x < kSide; ++x)
+    for (std::int32_t y = 0; y < kSide; ++y)
+      for (std::int32_t z = 0; z < kSide; ++z) volume.bricks.push_back({x, y, z});
+  volume.active.resize(volume.brickCount());
+  for (auto& mask : volume.active) mask.setAll();
+  volume.values.resize(volume.brickCount() * kBrickVoxels);
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    volume.values[i] = 0.125f + float(i % kBrickVoxels / 64) / 8.0f;
+  return grid;
+}
+
+test::ProgramRun limited(const std::string& program, const std::vector<std::string>& arguments) {
+  std::string line = "ulimit -d " + std::string(kLimit) + "; exec " + program;
+  for (const auto& argument : arguments) line += " '" + argument + "'";
+  return test::runProgram("/bin/sh", {"-c", line});
+}
+
+TEST(OutOfCore, SlowVolumeOfThreeTimesTheMemoryGoesThereAndBack) {
+  const test::TemporaryFolder folder;
+  const std::string in = folder / "in.vdb", file = folder / "out.esvr", back = folder / "back.vdb";
+  writeGrids(in, {}, std::vector{denseGrid()}, {.constantTiles = false});
+  const std::vector<std::string> memory{"--max-memory", kMaxMemory, "--scratch",
+                                        folder.path().string()};
+  const auto run = [&](const std::string& program, std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), memory.begin(), memory.end());
+    const auto ended = limited(program, arguments);
+    EXPECT_EQ(ended.exitCode, 0) << program << ended.out << ended.err;
+  };
+  run(VDB2ESVR, {in, file, "--count", "300", "--iterations", "1", "--storage", "float32",
+                 "--device", "cpu", "--threads", "2", "-q"});
+  run(ESVR2VDB, {file, back, "--threads", "2"});
+  run(ESVR_COMPARE, {"check", in, back, "--min-psnr", "1", "--threads", "2"});
+}
+
+/// Enough for a small volume without its voxels.
+constexpr const char* kLittle = "40KB";
+
+class Scratch : public test::Vdb2Esvr {
+ protected:
+  using Arguments = std::vector<std::string>;
+
+  [[nodiscard]] Arguments withLittle(Arguments more, const std::string& scratch) const {
+    more.insert(more.end(), {"--max-memory", kLittle, "--scratch", scratch});
+    return more;
+  }
+  [[nodiscard]] test::ProgramRun fitWithLittle(const std::string& output,
+                                               const std::string& scratch,
+                                               const Arguments& more = {}) const {
+    return test::quickFit(in(), output, withLittle(more, scratch));
+  }
+  [[nodiscard]] std::string here() const { return folder_.path().string(); }
+};
+
+TEST_F(Scratch, HoldsVoxelsAndChangesNoBit) {
+  for (const Arguments& form : {Arguments{}, {"--storage", "float32"}}) {
+    const std::string little = folder_ / "little.esvr";
+    ASSERT_EQ(test::quickFit(in(), out(), form).exitCode, 0);
+    const auto run = fitWithLittle(little, here(), form);
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_EQ(test::readText(little), test::readText(out()));
+    std::filesystem::remove(little);
+    std::filesystem::remove(out());
+  }
+}
+
+TEST_F(Scratch, HoldsVoxelsOfLosslessFilesOnTheWayThereAndBack) {
+  const Arguments there{in(), out(), "--lossless"}, back{out(), folder_ / "back.vdb"},
+      check{"check", in(), folder_ / "back.vdb", "--max-error", "0", "--fail-on", "all"};
+  const auto converted = test::vdb2esvr(withLittle(there, here()));
+  ASSERT_EQ(converted.exitCode, 0) << converted.err;
+  const auto restored = test::esvr2vdb(withLittle(back, here()));
+  ASSERT_EQ(restored.exitCode, 0) << restored.err;
+  const auto checked = test::runProgram(ESVR_COMPARE, withLittle(check, here()));
+  EXPECT_EQ(checked.exitCode, 0) << checked.out << checked.err;
+}
+
+// No file can be made in /proc, for root either.
+TEST_F(Scratch, WithoutRoomIsAnErrorThatNamesTheFolder) {
+  const auto run = fitWithLittle(out(), "/proc");
+  EXPECT_EQ(run.exitCode, 5);
+  EXPECT_THAT(run.err, HasSubstr("of files in /proc, which has 0 MB free"));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(Scratch, IsAFolderThatExistsInEveryProgram) {
+  const std::string missing = folder_ / "missing";
+  ASSERT_EQ(fitQuickly().exitCode, 0);
+  const std::vector<std::pair<const char*, Arguments>> runs{
+      {VDB2ESVR, {in(), folder_ / "a.esvr"}},
+      {ESVR2VDB, {out(), folder_ / "a.vdb"}},
+      {ESVR_RENDER, {out(), folder_ / "a.png"}},
+      {ESVR_COMPARE, {"check", in(), out()}},
+      {ESVR_COMPARE, {"table", in(), out()}},
+      {ESVR_COMPARE, {"curves", in(), out(), "-o", folder_ / "c"}}};
+  for (auto [program, arguments] : runs) {
+    arguments.insert(arguments.end(), {"--scratch", missing});
+    const auto run = test::runProgram(program, arguments);
+    EXPECT_EQ(run.exitCode, 2) << program << run.out;
+    EXPECT_THAT(run.err, AllOf(HasSubstr("--scratch"), HasSubstr(missing))) << program;
   }
 }
 

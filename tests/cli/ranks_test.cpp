@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "cli/converters.h"
-#include "cli/folder_test.h"
+#include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 
 namespace esvr {

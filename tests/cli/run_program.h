@@ -1,9 +1,12 @@
 #pragma once
-/// Runs a program for the tests as a user does.
+/// Runs programs for the tests as a user does.
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 #include <sys/types.h>
 
 #include <filesystem>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -52,5 +55,37 @@ ProgramRun runInterrupted(const std::filesystem::path& program,
 
 void writeText(const std::filesystem::path& path, const std::string& text);
 [[nodiscard]] std::string readText(const std::filesystem::path& path);
+
+class FolderTest : public testing::Test {
+ protected:
+  [[nodiscard]] std::string at(const std::string& name) const { return folder_ / name; }
+  [[nodiscard]] std::uintmax_t sizeOf(const std::string& name) const {
+    return std::filesystem::file_size(at(name));
+  }
+  TemporaryFolder folder_;
+};
+
+struct Refusal {
+  std::vector<std::string> arguments;  ///< "DIR/" stands for the test's folder
+  int code;
+  const char* words;  ///< in the message
+
+  [[nodiscard]] std::vector<std::string> argumentsIn(const TemporaryFolder& folder) const {
+    const std::string place = folder / "";
+    std::vector<std::string> all = arguments;
+    for (std::string& argument : all)
+      for (std::size_t i = 0; (i = argument.find("DIR/", i)) != std::string::npos;
+           i += place.size())
+        argument.replace(i, 4, place);
+    return all;
+  }
+  void expectOf(const ProgramRun& run) const {
+    EXPECT_EQ(run.exitCode, code) << run.err;
+    EXPECT_THAT(run.err, testing::HasSubstr(words));
+  }
+};
+inline std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
+  return out << testing::PrintToString(refusal.arguments);
+}
 
 }  // namespace esvr::test

@@ -1,25 +1,42 @@
-// Plan: the JSON report of a run is compared with the file that the run wrote, with the voxels that
-// come back from this file, and with the options. A run that fails has a report, too.
+// Plan: the JSON report of a run is compared with the file that the run wrote, with the voxels
+// that come back from this file, and with the options. A run that fails has a report, too.
+// docs/report.md names exactly the keys that reports have. The reports of several runs are merged,
+// so that they have every key that a run can write. They are compared with the tables of the
+// document: each key must be in both. For each of the three decisions in a report's `left_out`,
+// one run uses the part and one does not. The figures are those of the file and of the candidates.
+// A decision that a run did not have to make has no figures.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
 
-#include "cli/vdb2esvr_fixture.h"
+#include "cli/converters.h"
+#include "cli/run_program.h"
+#include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
+#include "field/random_field.h"
 
 namespace esvr {
 namespace {
 
-using Json = nlohmann::json;
 using test::softBall;
 using test::Vdb2Esvr;
 using test::vdb2esvr;
 using testing::HasSubstr;
+
+using Json = nlohmann::json;
 
 TEST_F(Vdb2Esvr, reportsWhatTheFileHolds) {
   const auto run = fitQuickly({"--report", "-"});
@@ -102,6 +119,361 @@ TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
   EXPECT_EQ(metrics["psnr_active"].get<double>(), m.psnrActive);
   EXPECT_EQ(metrics["max_error"].get<double>(), m.maxError);
   EXPECT_EQ(metrics["iou"].get<double>(), m.iou);
+}
+
+using Json = nlohmann::json;
+using Keys = std::set<std::string>;
+using Table = std::map<std::string, std::string>;  // meaning of each key
+
+/// Words in backticks in the document that are values, or keys of another object.
+const Keys kNoKeys{"blocks", "default", "drawing", "learned", "mask",
+                   "null",   "paper",   "vec3d",   "vec3s",   "voxels"};
+
+/// Words in backticks that may be keys: options have dashes, and values capitals or spaces.
+Keys namedIn(const std::string& text) {
+  static const std::regex kWord("`([a-z0-9_]+)`");
+  Keys words;
+  for (std::sregex_iterator it(text.begin(), text.end(), kWord), end; it != end; ++it)
+    words.insert((*it)[1]);
+  return words;
+}
+
+Keys keysOf(const Json& object) {
+  Keys keys;
+  for (const auto& item : object.items()) keys.insert(item.key());
+  return keys;
+}
+
+Keys without(Keys keys, const Keys& others) {
+  for (const auto& key : others) keys.erase(key);
+  return keys;
+}
+
+/// Merges `report` into `all`: objects get the keys of both, and lists become one element.
+void merge(Json& all, const Json& report) {
+  if (report.is_object()) {
+    if (!all.is_object()) all = Json::object();
+    for (const auto& item : report.items()) merge(all[item.key()], item.value());
+  } else if (report.is_array() && !report.empty() && report[0].is_object()) {
+    for (const auto& element : report) merge(all, element);
+  } else if (all.is_null()) {
+    all = report;
+  }
+}
+
+std::string from(const std::string& text, const std::string& start) {
+  const std::size_t at = text.find(start);
+  EXPECT_NE(at, std::string::npos) << "docs/report.md has no '" << start << "'";
+  return at == std::string::npos ? "" : text.substr(at);
+}
+
+std::string paragraphFrom(const std::string& text, const std::string& start) {
+  const std::string rest = from(text, start);
+  return rest.substr(0, rest.find("\n\n"));
+}
+
+/// The first table after `start`: the keys in its first column, with the text of its last column.
+Table tableAfter(const std::string& text, const std::string& start) {
+  Table table;
+  const std::string rest = from(from(text, start), "\n|");
+  std::istringstream lines(rest.substr(1));
+  for (std::string line; std::getline(lines, line) && line.starts_with("|");) {
+    const std::size_t first = line.find(" |"), last = line.rfind(" | ", line.size() - 3);
+    for (const auto& key : namedIn(line.substr(0, first))) table[key] = line.substr(last);
+  }
+  return table;
+}
+
+Keys keysOf(const Table& table) {
+  Keys keys;
+  for (const auto& [key, meaning] : table) keys.insert(key);
+  return keys;
+}
+
+/// The keys of an object and of the objects in it.
+Keys allKeysOf(const Json& object) {
+  Keys keys = keysOf(object);
+  for (const auto& item : object.items())
+    if (item.value().is_object()) keys.merge(keysOf(item.value()));
+  return keys;
+}
+
+/// Checks that a text names the keys of an object. It may name keys of inner objects too. A text
+/// without keys explains the object in words, and is not checked.
+void expectNamed(const Json& object, const std::string& text, const std::string& where) {
+  const Keys named = namedIn(text);
+  if (!object.is_object() || without(named, kNoKeys).empty()) return;
+  EXPECT_EQ(without(keysOf(object), named), Keys{}) << where << ": not documented";
+  EXPECT_EQ(without(without(named, kNoKeys), allKeysOf(object)), Keys{})
+      << where << ": not written";
+}
+
+/// Checks an object against a table, and its inner objects against the rows of the table.
+/// \param others  inner objects that have a table of their own
+void expectTable(const Json& object, const Table& table, const Keys& others,
+                 const std::string& where) {
+  EXPECT_EQ(keysOf(object), keysOf(table)) << where;
+  for (const auto& [key, meaning] : table)
+    if (!others.contains(key) && object.contains(key))
+      expectNamed(object[key], meaning, where + "." + key);
+}
+
+class ReportDoc : public test::FolderTest {
+ protected:
+  /// Runs a program and merges its report into `all_`.
+  void add(const char* program, std::vector<std::string> arguments, int exitCode = 0) {
+    arguments.insert(arguments.end(), {"--report", at("r.json"), "--force"});
+    const auto run = test::runProgram(program, arguments);
+    ASSERT_EQ(run.exitCode, exitCode) << run.err;
+    merge(all_, Json::parse(test::readText(at("r.json"))));
+  }
+
+  std::string document_ = test::readText(ESVR_SOURCE_DIR "/docs/report.md");
+  Json all_;
+};
+
+TEST_F(ReportDoc, namesTheKeysOfAConversion) {
+  test::writeMixedInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  test::writeInput(at("cloud.vdb"), {{.voxels = test::cloud(12)}});
+  const std::vector<std::string> quick{"--device", "cpu", "--iterations", "60"};
+  const auto convert = [&](const char* input, std::vector<std::string> more) {
+    more.insert(more.begin(), {at(input), at("out.esvr")});
+    more.insert(more.end(), quick.begin(), quick.end());
+    add(VDB2ESVR, more);
+  };
+  convert("in.vdb", {"--count", "30"});
+  convert("cloud.vdb", {"--max-error", "5%"});
+  test::writeInput(at("surface.vdb"),
+                   {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});
+  convert("surface.vdb", {"--max-error", "5%"});
+  test::writeVectorInput(at("wind.vdb"), {.voxels = test::softBall({})});
+  convert("wind.vdb", {"--count", "30", "--representation", "ellipsoids"});
+  add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--paper", "epochs=28,points=60", "--count", "40",
+                 "--device", "cpu"});
+
+  expectTable(all_, tableAfter(document_, "## The report of a conversion"),
+              {"error", "grids", "seconds"}, "report");
+  const Table grid = tableAfter(document_, "### Each grid");
+  expectTable(all_["grids"], grid, {"curve", "fit", "paper"}, "grid");
+  expectTable(all_["grids"]["fit"], tableAfter(document_, "The object `fit`:"), {}, "fit");
+  expectTable(all_["grids"]["paper"], tableAfter(document_, "The object `paper`:"), {}, "paper");
+  const std::string curve = from(paragraphFrom(document_, "The list `curve`"), "point: ");
+  expectNamed(all_["grids"]["curve"], curve.substr(0, curve.find(". ")), "curve");
+  const std::string seconds = tableAfter(document_, "## The report of a conversion")["seconds"];
+  expectNamed(all_["seconds"], grid.at("seconds") + seconds, "seconds");
+}
+
+TEST_F(ReportDoc, namesTheKeysOfASequence) {
+  test::writeInput(at("in.1.vdb"), {{.voxels = test::softBall({})}});
+  test::writeText(at("in.2.vdb"), "no volume");
+  add(VDB2ESVR,
+      {at("in.@.vdb"), at("out.@.esvr"), "--frames", "1-2", "--count", "30", "--iterations", "60",
+       "--device", "cpu"},
+      3);
+  add(VDB2ESVR, {at("in.@.vdb"), at("all.esvr"), "--frames", "1", "--count", "30", "--iterations",
+                 "60", "--device", "cpu"});
+  const Table report = tableAfter(document_, "## The report of a sequence");
+  // The table names the words of the states for the frames.
+  expectTable(all_, report, {"asked", "command_line", "frames", "states", "versions"}, "sequence");
+  expectTable(all_["frames"], tableAfter(document_, "The objects of `frames`:"),
+              {"grids", "input", "output", "seconds", "skipped"}, "frame");
+}
+
+TEST_F(ReportDoc, namesTheKeysOfTheProgressOfASequence) {
+  test::writeInput(at("in.1.vdb"), {{.voxels = test::softBall({})}});
+  const auto run = test::quickFit(at("in.@.vdb"), at("out.@.esvr"), {"--progress", "json"});
+  const Table table = tableAfter(document_, "For a sequence, there is a line");
+  EXPECT_EQ(keysOf(Json::parse(run.err)), keysOf(table));
+}
+
+TEST_F(ReportDoc, namesTheKeysOfAFailure) {
+  test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--size", "99"}, 2);
+  const std::string text = paragraphFrom(document_, "A run that writes no file");
+  Keys keys = keysOf(all_);
+  for (const char* object : {"error", "input"})
+    for (const auto& key : keysOf(all_[object])) keys.insert(key);
+  EXPECT_EQ(keys, without(namedIn(text), {"usage", "device", "failure"}));
+}
+
+TEST_F(ReportDoc, namesTheKeysOfAPicture) {
+  test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  add(ESVR_RENDER, {at("in.esvr"), at("p.png"), "--ref", at("in.vdb"), "--resolution", "16x16"});
+  add(ESVR_RENDER, {at("in.esvr"), "--bench", "--turntable", "2", "--ref", at("in.vdb"),
+                    "--resolution", "16x16", "--device", "cpu"});
+  const Keys timed{"drawn", "reference"};
+  expectTable(all_, tableAfter(document_, "## The report of a picture"), timed, "report");
+  const Table figures = tableAfter(document_, "The objects `drawn` and `reference`:");
+  for (const auto& object : timed) expectTable(all_[object], figures, {}, object);
+}
+
+class ComparisonDoc : public ReportDoc {
+ protected:
+  void SetUp() override {
+    test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  }
+};
+
+TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
+  // NanoVDB has no place for some metadata, which gives differences.
+  ASSERT_EQ(test::esvr2vdb({at("in.esvr"), at("back.nvdb")}).exitCode, 0);
+  add(ESVR_COMPARE, {"check", at("in.vdb"), at("back.nvdb"), "--ssim"});
+  for (const std::string frame : {"1", "2"})
+    test::writeInput(at("s." + frame + ".vdb"), {{.voxels = test::softBall({})}});
+  add(ESVR_COMPARE, {"check", at("s.@.vdb"), at("s.@.vdb")});
+  test::writeInput(at("surface.vdb"),
+                   {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});
+  add(ESVR_COMPARE, {"check", at("surface.vdb"), at("surface.vdb"), "--max-mesh-distance", "1"});
+  expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
+}
+
+TEST_F(ComparisonDoc, namesTheKeysOfATable) {
+  add(ESVR_COMPARE, {"table", at("in.vdb"), at("in.esvr"), "--runs", "1", "--images", "1",
+                     "--image-size", "16", "--device", "cpu"});
+  expectTable(all_, tableAfter(document_, "The report of `table`"), {"rows"}, "table");
+  const Table row = tableAfter(document_, "A row has only the keys");
+  EXPECT_EQ(keysOf(all_["rows"]), without(keysOf(row), {"device_bytes", "lpips"}));
+  for (const char* object : {"encode", "decode", "search"})
+    expectNamed(all_["rows"][object], row.at(object), object);
+}
+
+TEST_F(ComparisonDoc, namesTheKeysOfCurves) {
+  const auto run =
+      test::runProgram(ESVR_COMPARE, {"curves", at("in.vdb"), at("in.esvr"), "--output", at("c"),
+                                      "--fit", "1KB", "--fps", "16", "--device", "cpu"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  merge(all_, Json::parse(test::readText(at("c.json"))));
+  expectTable(all_, tableAfter(document_, "The report of `curves`"), {}, "curves");
+}
+
+using Json = nlohmann::json;
+using Voxels = std::vector<test::InputVoxel>;
+
+struct Input {
+  float background = 0.0f;  ///< above 0 for a level set
+  const char* iterations = "60";
+};
+
+class LeftOut : public testing::Test {
+ protected:
+  /// The first grid of the report of a conversion.
+  Json gridOf(const Voxels& voxels, std::vector<std::string> options, const Input& input = {}) {
+    test::writeInput(
+        in_,
+        {{.voxels = voxels, .background = input.background, .levelSet = input.background > 0.0f}});
+    options.insert(options.begin(), {in_, folder_ / "out.esvr", "--device", "cpu", "--force"});
+    options.insert(options.end(), {"--iterations", input.iterations, "--report", "-"});
+    const auto run = test::vdb2esvr(options);
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    return Json::parse(run.out)["grids"][0];
+  }
+
+  /// The entry of a part, of which there must be exactly one.
+  static Json entryOf(const Json& grid, const std::string& part) {
+    Json found;
+    int entries = 0;
+    for (const auto& entry : grid["left_out"])
+      if (entry["part"] == part) found = entry, ++entries;
+    EXPECT_EQ(entries, 1) << part;
+    return found;
+  }
+
+  static void expectNoFigures(const Json& entry) {
+    for (const char* key : {"bytes_with", "bytes_without", "seconds"})
+      EXPECT_FALSE(entry.contains(key)) << entry;
+  }
+
+  static Voxels noise() {
+    test::Random random(17);
+    Voxels voxels = test::softBall({});
+    for (auto& voxel : voxels) voxel.value = float(random(0.1, 1.0));
+    return voxels;
+  }
+
+  /// Noise of which half the voxels have one value.
+  static Voxels noiseWithPlateau() {
+    Voxels voxels = noise();
+    for (auto& voxel : voxels)
+      if (voxel.at.x < 0) voxel.value = 0.731f;
+    return voxels;
+  }
+
+  /// The narrow band of a sphere.
+  static Voxels band() {
+    Voxels voxels = test::distances(12);
+    std::erase_if(voxels, [](const auto& voxel) { return std::abs(voxel.value) >= kBandWidth; });
+    return voxels;
+  }
+
+  static constexpr float kBandWidth = 3.0f;  ///< voxels
+  test::TemporaryFolder folder_;
+  std::string in_ = folder_ / "in.vdb";
+};
+
+TEST_F(LeftOut, saysWhetherTheSumIsClamped) {
+  const std::vector<std::string> ellipsoids{"--count", "30", "--representation", "ellipsoids"};
+  const Json clamp = entryOf(gridOf(test::softBall({}), ellipsoids), "clamp");
+  EXPECT_TRUE(clamp["used"]);
+  expectNoFigures(clamp);
+  EXPECT_FALSE(entryOf(gridOf(noise(), {"--lossless"}), "clamp")["used"]);
+  EXPECT_FALSE(entryOf(gridOf(band(), ellipsoids, {.background = kBandWidth}), "clamp")["used"]);
+}
+
+TEST_F(LeftOut, namesLayersAndTheGpuOnlyForEllipsoids) {
+  const Json ellipsoids =
+      gridOf(test::softBall({}), {"--count", "9", "--representation", "ellipsoids"});
+  EXPECT_FALSE(entryOf(ellipsoids, "importance layers")["used"]);
+  EXPECT_FALSE(entryOf(ellipsoids, "GPU")["used"]);
+  for (const auto& entry : gridOf(noise(), {"--lossless"})["left_out"]) {
+    EXPECT_NE(entry["part"], "importance layers");
+    EXPECT_NE(entry["part"], "GPU");
+  }
+}
+
+TEST_F(LeftOut, hasTheSecondsOfTheShortFitsThatAClampMakesPossible) {
+  Voxels flat = test::softBall({});
+  for (auto& voxel : flat) voxel.value = std::min(voxel.value, 0.5f);
+  const Json grid = gridOf(flat, {"--size", "2000", "--representation", "ellipsoids"});
+  const Json clamp = entryOf(grid, "clamp");
+  EXPECT_TRUE(clamp["used"]);
+  ASSERT_TRUE(clamp.contains("seconds"));
+  EXPECT_GT(clamp["seconds"].get<double>(), 0.0);
+}
+
+TEST_F(LeftOut, saysWhetherTheLatticeContainsThePlateau) {
+  const Json grid = gridOf(noiseWithPlateau(), {"--psnr", "30"});
+  const Json plateau = entryOf(grid, "plateau");
+  EXPECT_TRUE(plateau["used"]);
+  EXPECT_EQ(plateau["bytes_with"], grid["representation"]["voxels"]["bytes"]);
+  EXPECT_LT(plateau["bytes_with"].get<int>(), plateau["bytes_without"].get<int>());
+  EXPECT_GT(plateau["seconds"].get<double>(), 0.0);
+}
+
+TEST_F(LeftOut, saysWhyThereIsNoPlateau) {
+  const Json searched = entryOf(gridOf(noise(), {"--psnr", "30"}), "plateau");
+  EXPECT_FALSE(searched["used"]);
+  EXPECT_TRUE(searched.contains("seconds")) << "the most frequent value was searched for";
+  EXPECT_FALSE(searched.contains("bytes_with"));
+  const Json exact = entryOf(gridOf(noise(), {"--lossless"}), "plateau");
+  EXPECT_FALSE(exact["used"]);
+  expectNoFigures(exact);
+}
+
+TEST_F(LeftOut, hasNoBytesThatWereOnlyEstimated) {
+  const Json grid = gridOf(noise(), {"--psnr", "40"});
+  ASSERT_TRUE(grid["representation"]["ellipsoids"]["estimated"]);
+  const Json choice = entryOf(grid, "representation");
+  EXPECT_EQ(choice["bytes_with"], grid["representation"]["voxels"]["bytes"]);
+  EXPECT_FALSE(choice.contains("bytes_without"));
+  EXPECT_GT(choice["seconds"].get<double>(), 0.0) << "the short fit took time";
+}
+
+TEST_F(LeftOut, hasNoFiguresOfARepresentationThatIsGiven) {
+  const Json choice = entryOf(gridOf(noise(), {"--lossless"}), "representation");
+  EXPECT_FALSE(choice["used"]);
+  expectNoFigures(choice);
 }
 
 }  // namespace

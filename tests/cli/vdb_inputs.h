@@ -1,13 +1,18 @@
 #pragma once
-/// Writes VDB files with OpenVDB itself, as other programs do: inputs for the tests of the
-/// programs.
+/// Writes VDB files with OpenVDB itself, as other programs do: inputs for the tests of the programs.
+/// Reads the grids of VDB files that are not fitted.
 
 #include <array>
+#include <cstddef>
 #include <filesystem>
+#include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "esvr/coord.h"
+#include "esvr/vdb_io.h"
+#include "vdb/carried_bytes.h"
 
 namespace esvr::test {
 
@@ -62,5 +67,23 @@ void writeMixedInput(const std::filesystem::path& path, const std::vector<InputG
 
 /// The distance from a sphere of radius 8 around the origin, in the cube from -reach to reach.
 [[nodiscard]] std::vector<InputVoxel> distances(int reach);
+
+inline std::vector<std::string> namesIn(const std::string& path) {
+  std::vector<std::string> names;
+  for (const auto& grid : inspectVdb(path).grids) names.push_back(grid.uniqueName);
+  return names;
+}
+
+/// The grids of a .vdb file as bytes, without their places and the version of the format.
+inline std::vector<CarriedGrid> bytesIn(const std::string& path,
+                                        std::vector<std::size_t> places = {}) {
+  if (places.empty()) {
+    places.resize(inspectVdb(path).grids.size());
+    std::iota(places.begin(), places.end(), std::size_t{0});
+  }
+  auto grids = readCarried(path, places);
+  for (auto& grid : grids) grid.place = 0;
+  return withoutVersion(std::move(grids));
+}
 
 }  // namespace esvr::test
