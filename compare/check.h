@@ -1,9 +1,94 @@
 #pragma once
 /// esvr-compare check: compares a file with its reference and fails if it differs too much.
 
-#include "compare/check_options.h"
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "cli/error_bound.h"
+#include "cli/frame_range.h"
+#include "cli/host_memory.h"
+#include "cli/log.h"
+#include "compare/figures.h"
+#include "esvr/coord.h"
+#include "esvr/metrics.h"
 
 namespace esvr::compare {
+
+/// What two grids differ in besides their voxels.
+enum class DifferenceKind {
+  kName,
+  kClass,
+  kValueType,
+  kBackground,
+  kTransform,
+  kMetadata,
+  kInactive  ///< values of inactive voxels and tiles
+};
+
+struct Difference {
+  DifferenceKind kind = DifferenceKind::kName;
+  std::string text;  ///< text with the reference first: "class: level set, fog volume"
+};
+
+struct CheckOptions {
+  std::filesystem::path reference, candidate;
+  cli::InputFiles inputs;
+  std::optional<std::vector<cli::FrameNumber>>
+      frames;                      ///< frames that are compared, of sequences; nothing: all
+  std::vector<std::string> grids;  ///< NAME or NAME=NAME IN CAND; empty: all
+  /// Grids that are not compared, and that only one of the files may have.
+  std::set<std::string> ignored;
+  std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;
+  std::optional<std::uint64_t> maxBytes;
+  std::set<DifferenceKind> failOn;
+  std::optional<std::filesystem::path> baseline;
+  bool update = false;  ///< whether the baseline is written
+  std::optional<Box> box;
+  std::optional<double> peak;
+  bool ssim = false;   ///< whether SSIM is measured without a limit on it
+  std::string report;  ///< file name or "-"; empty: no report
+  bool overwrite = false;
+  cli::HostMemory memory;  ///< memory that input may take
+  int threads = 0;
+  cli::Verbosity verbosity = cli::Verbosity::kNormal;
+  std::vector<std::string> commandLine;
+};
+
+struct CheckedGrid {
+  std::string name, candidateName;  ///< unique names in the two files
+  VolumeMetrics metrics{};
+  FigureValues figures{};
+  std::vector<Difference> differences{};
+  std::optional<std::int64_t> frame{};  ///< number of its frame, if the files are sequences
+  double range = 0.0;  ///< to which limits in % refer: valueRangeOf() or valueRangeOfVectors()
+  /// The row has the lengths of vectors. Limits on errors hold for the components, as the bounds of
+  /// a conversion do; the error of a length is at most sqrt(3) times theirs.
+  bool isLengths = false;
+};
+
+struct CheckRecord {
+  std::uint64_t candidateBytes = 0;
+  std::vector<CheckedGrid> grids;
+  std::vector<Difference> fileDifferences;
+  /// Grids without figures that are the same in both files, one line each.
+  std::vector<std::string> same;
+  std::vector<std::string> skipped;   ///< grids that cannot be compared, with the reason
+  std::vector<std::string> extra;     ///< grids of the candidate that the reference does not have
+  std::vector<std::string> failures;  ///< one line for each failure
+  /// Grids whose voxels cannot be compared, such as those with NaN, with the reason.
+  std::vector<std::string> unreadable;
+  std::vector<std::string> notes;  ///< remarks that are not failures
+};
+
+/// \param argv  arguments, beginning with the command ("check")
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
+[[nodiscard]] std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv);
 
 /// Compares the files and prints figures and differences.
 /// \throws TargetMissed  a limit is missed; the text lists every failure

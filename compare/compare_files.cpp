@@ -1,20 +1,29 @@
+// Which grids of two files belong together, what they differ in, and how large the errors are.
+
 #include "compare/compare_files.h"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iterator>
 #include <limits>
-#include <map>
+#include <span>
 #include <utility>
 
 #include "cli/names.h"
-#include "compare/baseline.h"
-#include "compare/limits.h"
-#include "compare/unfitted.h"
+#include "cli/table.h"
+#include "compare/judge.h"
 #include "esvr/error.h"
+#include "esvr/grid_descriptor.h"
+#include "esvr/inactive_values.h"
 #include "esvr/mesh_distance.h"
+#include "esvr/temporal_metrics.h"
 #include "esvr/vector_metrics.h"
 
 namespace esvr::compare {
+
+// Pairs of grids.
+
 namespace {
 
 /// Indices of a grid in the two files; nothing if the candidate does not have it.
@@ -23,9 +32,9 @@ struct Pair {
   std::optional<std::size_t> candidate;
 };
 
-/// Grids that --ignore-grids names are left out. Where both files have the same number of grids of a name,
-/// it stands for the grids with this number in both; where the candidate has fewer, for that of the
-/// reference, whose other grids are then paired with those of the candidate.
+/// Grids that --ignore-grids names are left out. Where both files have the same number of grids of
+/// a name, it stands for the grids with this number in both; where the candidate has fewer, for
+/// that of the reference, whose other grids are then paired with those of the candidate.
 class Pairing {
  public:
   Pairing(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)
@@ -141,10 +150,203 @@ void requireResults(const GridFile& reference, const CheckRecord& record) {
   throw BadInput(text);
 }
 
-bool disjoint(const Box& a, const Box& b) {
-  const Box common{maxCoord(a.min, b.min), minCoord(a.max, b.max)};
-  return common.empty();
+}  // namespace
+
+// Differences besides the voxels.
+
+namespace {
+
+/// OpenVDB's metadata items that repeat members of a descriptor.
+const std::array<std::string, 3> kRepeated{"name", "class", "is_saved_as_half_float"};
+
+constexpr double kEntryTolerance = 1e-12;  // relative to the largest entry: float64 rounding
+
+/// Appends the difference of two transforms. They are equal if the bytes of their maps are, or if
+/// both are affine and no entry of the matrices differs by more than 1e-12 of the largest, since
+/// NanoVDB stores maps in another form with rounding.
+void addTransform(const Transform& a, const Transform& b, std::vector<Difference>& list) {
+  if (a == b) return;
+  std::string how;
+  if (a.affine && b.affine) {
+    const std::array<double, 16>&m = *a.affine, &n = *b.affine;
+    double by = 0.0, largest = 0.0;
+    for (std::size_t i = 0; i < m.size(); ++i) {
+      by = std::max(by, std::abs(m[i] - n[i]));
+      largest = std::max({largest, std::abs(m[i]), std::abs(n[i])});
+    }
+    if (by <= kEntryTolerance * largest) return;
+    how = " (matrices differ by up to " + cli::shortNumber(by) + ")";
+  }
+  list.push_back(
+      {DifferenceKind::kTransform, "transform: " + a.mapType + ", another " + b.mapType + how});
 }
+
+std::map<std::string, const MetaItem*> byName(std::span<const MetaItem> items) {
+  std::map<std::string, const MetaItem*> found;
+  for (const auto& item : items) found[item.name] = &item;
+  return found;
+}
+
+Difference metadataDifference(const std::string& name, const std::string& how) {
+  return {DifferenceKind::kMetadata,
+          "metadata \"" + shownText(name, LineEnds::kReplace) + "\": " + how};
+}
+
+/// Lists the items that only one side has or that have different values, except for `ignored`.
+std::vector<Difference> compareMetadata(std::span<const MetaItem> reference,
+                                        std::span<const MetaItem> candidate,
+                                        std::span<const std::string> ignored) {
+  const auto isIgnored = [&](const std::string& name) {
+    return std::find(ignored.begin(), ignored.end(), name) != ignored.end();
+  };
+  const auto a = byName(reference), b = byName(candidate);
+  std::vector<Difference> differences;
+  for (const auto& [name, item] : a) {
+    if (isIgnored(name)) continue;
+    const auto other = b.find(name);
+    if (other == b.end())
+      differences.push_back(metadataDifference(name, "missing"));
+    else if (*other->second != *item)
+      differences.push_back(metadataDifference(name, "another value"));
+  }
+  for (const auto& [name, item] : b)
+    if (!isIgnored(name) && !a.contains(name))
+      differences.push_back(metadataDifference(name, "not in the reference"));
+  return differences;
+}
+
+/// The difference of the values of inactive voxels; nothing if they are the same.
+std::vector<Difference> compareInactive(const InactiveValues& reference,
+                                        const InactiveValues& candidate) {
+  if (reference == candidate) return {};
+  const auto text = [](const InactiveValues& values) {
+    return values.count() == 0 ? "none" : toText(values);
+  };
+  return {{DifferenceKind::kInactive,
+           "inactive values that are not the background: " + text(reference) +
+               ", in the candidate " + text(candidate)}};
+}
+
+/// Lists the differences of two descriptors. Metadata items that repeat the name, the class or the
+/// value type are ignored.
+std::vector<Difference> compareDescriptors(const GridDescriptor& a, const GridDescriptor& b) {
+  std::vector<Difference> list;
+  const auto add = [&](DifferenceKind kind, const std::string& what, const std::string& reference,
+                       const std::string& candidate) {
+    if (reference != candidate) list.push_back({kind, what + ": " + reference + ", " + candidate});
+  };
+  add(DifferenceKind::kName, "name", '"' + a.name + '"', '"' + b.name + '"');
+  add(DifferenceKind::kClass, "class", className(a.gridClass), className(b.gridClass));
+  add(DifferenceKind::kValueType, "value type", cli::nameOf(a.valueType), cli::nameOf(b.valueType));
+  if (a.background != b.background)
+    add(DifferenceKind::kBackground, "background", cli::shortNumber(a.background),
+        cli::shortNumber(b.background) + " (by " + cli::shortNumber(b.background - a.background) +
+            ")");
+  addTransform(a.transform, b.transform, list);
+  std::ranges::move(compareMetadata(a.metadata, b.metadata, kRepeated), std::back_inserter(list));
+  return list;
+}
+
+}  // namespace
+
+// Grids without figures: those whose values are not floats or doubles, and those without an active
+// voxel.
+
+namespace {
+
+/// Indices of a grid in the two files.
+struct GridPair {
+  const GridFile& reference;
+  std::size_t ofReference = 0;
+  const GridFile& candidate;
+  std::size_t ofCandidate = 0;
+
+  [[nodiscard]] const ListedGrid& a() const { return reference.grids()[ofReference]; }
+  [[nodiscard]] const ListedGrid& b() const { return candidate.grids()[ofCandidate]; }
+};
+
+constexpr const char* kDouble = "double";
+
+std::string lineOf(const GridPair& pair) { return "grid \"" + pair.a().uniqueName + "\": "; }
+
+/// True if two grids have the same bytes, wherever they are in their files.
+bool areEqual(CarriedGrid a, CarriedGrid b) {
+  a.place = b.place = 0;
+  return a == b;
+}
+
+/// True if the two grids are of types that cannot be compared with each other, or if one is of
+/// doubles and the other one is not.
+bool isRetyped(const GridPair& pair) {
+  if (!pair.a().comparable || !pair.b().comparable) return pair.a().valueType != pair.b().valueType;
+  return (pair.a().valueType == kDouble) != (pair.b().valueType == kDouble);
+}
+
+/// True if two grids have the same bytes in files without loss. They are read only if both files
+/// have them.
+bool haveSameBytes(const GridPair& pair) {
+  if (!pair.reference.hasBytes(pair.ofReference) || !pair.candidate.hasBytes(pair.ofCandidate))
+    return false;
+  const bool areVdb = !pair.reference.esvr() && !pair.candidate.esvr();
+  if (areVdb && pair.a().storedBytes != pair.b().storedBytes) return false;
+  const auto a = pair.reference.bytesOf(pair.ofReference);
+  const auto b = pair.candidate.bytesOf(pair.ofCandidate);
+  return a && b && areEqual(*a, *b);
+}
+
+/// Compares two grids of floats or doubles, of which the reference has no active voxel.
+void compareEmpty(const CheckOptions& options, const GridPair& pair, CheckRecord& record) {
+  const VolumeGrid a = pair.reference.read(pair.ofReference);
+  const VolumeGrid b = pair.candidate.read(pair.ofCandidate);
+  if (const auto voxels = activeVoxelCount(b.volume); voxels > 0)
+    record.failures.push_back(lineOf(pair) + "the candidate has " + std::to_string(voxels) +
+                              " active voxels, the reference has none");
+  else
+    record.same.push_back(lineOf(pair) + "no active voxel in either file");
+  auto differences = compareDescriptors(a.descriptor, b.descriptor);
+  for (auto& difference : compareInactive(a.inactive, b.inactive))
+    differences.push_back(std::move(difference));
+  for (const auto& difference : differences) {
+    const bool fails = options.failOn.contains(difference.kind);
+    (fails ? record.failures : record.notes).push_back(lineOf(pair) + difference.text);
+  }
+}
+
+/// Compares two grids whose bytes are the same in files without loss. Appends a line to the
+/// record's `same`, `failures` or, where one of the files is not a .vdb or .esvr file, `skipped`.
+void compareUnfitted(const CheckOptions& options, const GridPair& pair, CheckRecord& record) {
+  const auto a = pair.reference.bytesOf(pair.ofReference);
+  const auto b = pair.candidate.bytesOf(pair.ofCandidate);
+  if (a && b && areEqual(*a, *b))
+    record.same.push_back(lineOf(pair) + "the same bytes (" + pair.a().valueType + ")");
+  else if (pair.a().comparable)
+    compareEmpty(options, pair, record);
+  else if (a && b)
+    record.failures.push_back(lineOf(pair) + "its bytes differ; its values are of type " +
+                              pair.a().valueType + ", which is compared bit for bit");
+  else
+    record.skipped.push_back(lineOf(pair) + "its values are of type " + pair.a().valueType);
+}
+
+}  // namespace
+
+// Changes from frame to frame.
+
+void TemporalComparison::beginFrame() { before_ = std::exchange(current_, {}); }
+
+std::optional<double> TemporalComparison::compare(const std::string& grid,
+                                                  const ComparedVolumes& now) {
+  current_[grid] = {now.reference, now.candidate, now.peak};
+  const auto found = before_.find(grid);
+  if (found == before_.end()) return std::nullopt;
+  const Volumes& before = found->second;
+  return temporalPsnr({before.reference, now.reference}, {before.candidate, now.candidate},
+                      {.box = options_.box, .peak = std::max(before.peak, now.peak)});
+}
+
+// Figures.
+
+namespace {
 
 /// Compares one pair of grids after the other, so that only two volumes are in memory at a time.
 class Comparison {
@@ -168,7 +370,8 @@ class Comparison {
     const GridPair both{reference_, pair.reference, candidate_, *pair.candidate};
     const bool areVectors = both.a().isVector && both.b().isVector;
     if (isRetyped(both))
-      record.failures.push_back(retypedText(both));
+      record.failures.push_back(lineOf(both) + "its values are of type " + both.b().valueType +
+                                " in the candidate, " + both.a().valueType + " in the reference");
     else if (!(listed.comparable || areVectors) || listed.empty)
       compareUnfitted(options_, both, record);
     else if (haveSameBytes(both) && !(temporal_ && hasFigures(both)))
@@ -291,7 +494,9 @@ class Comparison {
 
   static void requireOverlap(const SparseVolume& a, const SparseVolume& b, const std::string& name,
                              CheckRecord& record) {
-    if (!disjoint(activeBox(a), activeBox(b))) return;
+    const Box boxA = activeBox(a), boxB = activeBox(b);
+    const Box common{maxCoord(boxA.min, boxB.min), minCoord(boxA.max, boxB.max)};
+    if (!common.empty()) return;
     record.failures.push_back("grid \"" + name + "\": " +
                               (activeVoxelCount(b) == 0
                                    ? "the candidate has no active voxel"

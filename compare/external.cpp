@@ -1,17 +1,74 @@
 #include "compare/external.h"
 
+#include <sys/wait.h>
+
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <functional>
+#include <limits>
+#include <utility>
 
 #include "cli/byte_size.h"
 #include "cli/number.h"
+#include "cli/shell_word.h"
+#include "cli/stopwatch.h"
 #include "compare/grid_file.h"
 #include "esvr/error.h"
+#include "esvr/metrics.h"
 
 namespace esvr::compare {
+
+// Commands in a shell.
+
+namespace {
+
+std::string lastLine(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  const std::size_t begin = text.rfind('\n');
+  return begin == std::string::npos ? text : text.substr(begin + 1);
+}
+
+[[noreturn]] void fail(const std::string& command, const std::string& option, int status,
+                       const std::string& output) {
+  const std::string end = WIFEXITED(status) ? "code " + std::to_string(WEXITSTATUS(status))
+                                            : "signal " + std::to_string(WTERMSIG(status));
+  const std::string last = lastLine(output);
+  throw RuntimeFailure(option + ": " + command + " ended with " + end +
+                       (last.empty() ? "" : ": " + last));
+}
+
+/// What `shell` prints. It runs `command`, which is named if it fails.
+std::string printed(const std::string& shell, const std::string& command,
+                    const std::string& option) {
+  FILE* pipe = popen(shell.c_str(), "r");
+  if (!pipe) throw RuntimeFailure(option + ": cannot run " + command);
+  std::string text;
+  std::array<char, 256> part{};
+  while (std::fgets(part.data(), int(part.size()), pipe)) text += part.data();
+  const int status = pclose(pipe);
+  if (status != 0) fail(command, option, status, text);
+  return text;
+}
+
+/// Runs a command whose output and messages matter only if it fails.
+void runCommand(const std::string& command, const std::string& option) {
+  (void)printed("{ " + command + "\n} 2>&1", command, option);
+}
+
+}  // namespace
+
+std::string outputOf(const std::string& command, const std::string& option) {
+  return printed(command, command, option);
+}
+
+// Results of other systems.
+
 namespace {
 
 struct TypeWord {
@@ -38,10 +95,11 @@ std::optional<Coord> parseDims(const std::string& text) {
   return Coord{sides[0], sides[1], sides[2]};
 }
 
-bool isType(const std::string& word) {
-  for (const auto& type : kTypes)
-    if (word == type.word) return true;
-  return false;
+/// The bytes of a value; 0 if the word is no type.
+std::size_t bytesOf(const std::string& type) {
+  for (const auto& known : kTypes)
+    if (type == known.word) return known.bytes;
+  return 0;
 }
 
 /// Reads a part like "encode=4.2". \return false if it is not of this form
@@ -66,17 +124,33 @@ void readPart(const std::string& part, External& external) {
   if (readFigure(part, external)) return;
   if (const auto dims = parseDims(part))
     external.dims = dims;
-  else if (isType(part))
+  else if (bytesOf(part) > 0)
     external.type = part;
   else
     refuse(external.text, "'" + part + "' is not understood");
 }
 
-std::size_t bytesOf(const std::string& type) {
-  for (const auto& known : kTypes)
-    if (type == known.word) return known.bytes;
-  return 0;
+}  // namespace
+
+External parseExternal(const std::string& text) {
+  External external;
+  external.text = text;
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0) refuse(text, "it has no name");
+  external.name = text.substr(0, equals);
+  const auto parts = cli::splitText(text.substr(equals + 1), ':');
+  if (parts.size() < 2 || parts[0].empty()) refuse(text, "it has no file and bytes");
+  external.file = parts[0];
+  external.bytes = cli::parseByteSize("external", parts[1]);
+  for (std::size_t i = 2; i < parts.size(); ++i) readPart(parts[i], external);
+  if (external.dims.has_value() == external.type.empty())
+    refuse(text, "dimensions and a type come together");
+  return external;
 }
+
+namespace {
+
+Coord sideOf(const Box& box) { return box.max - box.min + Coord{1, 1, 1}; }
 
 template <class T>
 float valueAt(const std::byte* from) {
@@ -96,7 +170,7 @@ float valueOf(const std::string& type, const std::byte* from) {
 /// Checks the size of a raw file.
 void checkRaw(const External& external, const Box& box) {
   const std::string file = external.file.string() + ": ";
-  const Coord side = box.max - box.min + Coord{1, 1, 1};
+  const Coord side = sideOf(box);
   if (*external.dims != side)
     throw BadInput(file + toString(*external.dims) + " voxels, but the box that is compared has " +
                    toString(side));
@@ -178,26 +252,231 @@ SparseVolume readVdb(const External& external, const ExternalPlace& place) {
 
 }  // namespace
 
-External parseExternal(const std::string& text) {
-  External external;
-  external.text = text;
-  const std::size_t equals = text.find('=');
-  if (equals == std::string::npos || equals == 0) refuse(text, "it has no name");
-  external.name = text.substr(0, equals);
-  const auto parts = cli::splitText(text.substr(equals + 1), ':');
-  if (parts.size() < 2 || parts[0].empty()) refuse(text, "it has no file and bytes");
-  external.file = parts[0];
-  external.bytes = cli::parseByteSize("external", parts[1]);
-  for (std::size_t i = 2; i < parts.size(); ++i) readPart(parts[i], external);
-  if (external.dims.has_value() == external.type.empty())
-    refuse(text, "dimensions and a type come together");
-  return external;
-}
-
 SparseVolume readExternal(const External& external, const ExternalPlace& place) {
   if (!external.dims) return readVdb(external, place);
   checkRaw(external, place.box);
   return RawReader(external, place).read();
+}
+
+// Compressors that a command runs.
+
+namespace {
+
+constexpr const char* kOption = "--external-command";
+
+void requireRoom(const ExternalSource& source) {
+  constexpr double kMegabyte = 1e6;
+  const double bytes = source.box.volume() * sizeof(float);
+  if (source.maxDense == 0 || bytes <= double(source.maxDense)) return;
+  throw UsageError("the box as an array takes " + std::to_string(std::uint64_t(bytes / kMegabyte)) +
+                   " MB, more than the bound of " +
+                   std::to_string(std::uint64_t(double(source.maxDense) / kMegabyte)));
+}
+
+/// The voxels of a box with x fastest.
+std::vector<float> arrayOf(const SparseVolume& volume, const Box& box) {
+  std::vector<float> array(std::size_t(box.volume()), volume.background);
+  const Coord side = sideOf(box);
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int i = 0; i < kBrickVoxels; ++i) {
+      const Coord voxel = volume.brickCorner(b) + voxelLocal(i);
+      if (voxel != minCoord(maxCoord(voxel, box.min), box.max)) continue;
+      const Coord at = voxel - box.min;
+      array[(std::size_t(at.z) * side.y + at.y) * side.x + at.x] = volume.brickValues(b)[i];
+    }
+  return array;
+}
+
+void writeRaw(const std::filesystem::path& path, const std::vector<float>& array) {
+  std::ofstream stream(path, std::ios::binary);
+  stream.write(reinterpret_cast<const char*>(array.data()),
+               std::streamsize(array.size() * sizeof(float)));
+  if (!stream.flush()) throw RuntimeFailure(path.string() + ": cannot be written");
+}
+
+/// Half of the smallest difference between an active voxel and the background.
+float activityThreshold(const SparseVolume& volume) {
+  float smallest = std::numeric_limits<float>::infinity();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int i = 0; i < kBrickVoxels; ++i) {
+      const float difference = std::abs(volume.brickValues(b)[i] - volume.background);
+      if (volume.active[b].test(i) && difference > 0.0f) smallest = std::min(smallest, difference);
+    }
+  return std::isfinite(smallest) ? smallest / 2 : 0.0f;
+}
+
+/// Makes voxels inactive that differ from the background by no more than a threshold; they keep
+/// their values.
+void deactivate(SparseVolume& volume, float threshold) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    BrickMask active;
+    for (int i = 0; i < kBrickVoxels; ++i)
+      if (std::abs(volume.brickValues(b)[i] - volume.background) > threshold) active.set(i);
+    volume.active[b] = active;
+  }
+}
+
+}  // namespace
+
+std::string boundText(double bound) {
+  std::array<char, 32> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), bound).ptr;
+  return {text.data(), end};
+}
+
+ExternalCommand parseExternalCommand(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    throw UsageError(std::string(kOption) + " '" + text + "': the form is NAME=COMMAND");
+  return {text, text.substr(0, equals), text.substr(equals + 1)};
+}
+
+ExternalCodec::ExternalCodec(const ExternalCommand& command, const ExternalSource& source)
+    : command_(command),
+      source_(source),
+      raw_(source.folder / "external.raw"),
+      packed_(source.folder / "external.packed"),
+      decoded_(source.folder / "external.decoded.raw") {
+  requireRoom(source_);
+  activeAbove_ = activityThreshold(source_.volume);
+  writeRaw(raw_, arrayOf(source_.volume, source_.box));
+}
+
+void ExternalCodec::run(const char* job, const std::filesystem::path& from,
+                        const std::filesystem::path& to) const {
+  if (source_.cancel && source_.cancel->cancelled()) throw Cancelled();
+  std::filesystem::remove(to);
+  const Coord side = sideOf(source_.box);
+  std::string line = command_.command + " " + job;
+  for (const auto& word : {from.string(), to.string(), std::to_string(side.x),
+                           std::to_string(side.y), std::to_string(side.z), boundText(bound_)})
+    line += " " + cli::shellWord(word);
+  runCommand(line, kOption);
+  if (!std::filesystem::exists(to))
+    throw RuntimeFailure(std::string(kOption) + ": " + line + " wrote no file");
+}
+
+ExternalCodec::Encoded ExternalCodec::encode(double bound) {
+  bound_ = bound;
+  cli::Stopwatch watch;
+  run("encode", raw_, packed_);
+  const double seconds = watch.lap();
+  return {std::filesystem::file_size(packed_), seconds};
+}
+
+double ExternalCodec::secondsToDecode() {
+  cli::Stopwatch watch;
+  run("decode", packed_, decoded_);
+  return watch.lap();
+}
+
+SparseVolume ExternalCodec::decode() {
+  run("decode", packed_, decoded_);
+  External raw;
+  raw.file = decoded_;
+  raw.dims = sideOf(source_.box);
+  raw.type = "float32";
+  SparseVolume volume =
+      readExternal(raw, {{}, source_.box, source_.volume.background, source_.memory});
+  deactivate(volume, activeAbove_);
+  return volume;
+}
+
+// The search for a bound.
+
+namespace {
+
+constexpr double kDecade = 10.0;
+constexpr int kDecades = 9;         // bounds from the peak to its 1e-9
+constexpr int kMaxBisections = 10;  // a step of 10 is then divided into parts of 0.2 %
+constexpr double kSufficientFill = 0.98;
+constexpr double kSufficientExcess = 0.05;  // dB
+
+/// What a search wants of its trials.
+struct Aim {
+  std::function<bool(const ExternalStep&)> allowed;     ///< may this trial be the result?
+  std::function<bool(const ExternalStep&)> tooFine;     ///< should the next bound be larger?
+  std::function<bool(const ExternalStep&)> sufficient;  ///< may the search end with this trial?
+  std::function<bool(const ExternalStep&, const ExternalStep&)> better;
+  bool measuresAll = false;  ///< whether the PSNR of trials that are not allowed matters
+  bool active = false;       ///< whether the PSNR is that over the active voxels
+};
+
+class Search {
+ public:
+  Search(ExternalCodec& codec, const Aim& aim) : codec_(codec), aim_(aim) {}
+
+  ExternalMatch run() {
+    double coarse = codec_.source().peak;
+    bool passed = tooFine(coarse);
+    for (int i = 0; i < kDecades && !passed && !ended_; ++i) {
+      passed = tooFine(coarse / kDecade);
+      if (passed && !ended_)
+        bisect(coarse, coarse / kDecade);
+      else
+        coarse /= kDecade;
+    }
+    return std::move(match_);
+  }
+
+ private:
+  void bisect(double coarse, double fine) {
+    for (int i = 0; i < kMaxBisections && !ended_; ++i) {
+      const double middle = std::sqrt(coarse * fine);
+      (tooFine(middle) ? fine : coarse) = middle;
+    }
+  }
+
+  /// Tries a bound and keeps the trial if it is the best so far.
+  bool tooFine(double bound) {
+    ExternalStep step{bound, codec_.encode(bound).bytes, std::numeric_limits<double>::quiet_NaN()};
+    if (aim_.measuresAll || aim_.allowed(step)) step.psnr = psnr();
+    match_.steps.push_back(step);
+    if (aim_.allowed(step) && (!match_.found || aim_.better(step, match_.best))) {
+      match_.best = step;
+      match_.found = true;
+    }
+    ended_ = aim_.allowed(step) && aim_.sufficient(step);
+    return aim_.tooFine(step);
+  }
+
+  double psnr() {
+    const ExternalSource& source = codec_.source();
+    const CompareOptions options{.box = source.box, .peak = source.peak};
+    const SparseVolume decoded = codec_.decode();
+    return aim_.active ? compareVolumes(source.volume, decoded, options).psnrActive
+                       : psnrOverBox(source.volume, decoded, options);
+  }
+
+  ExternalCodec& codec_;
+  const Aim& aim_;
+  ExternalMatch match_;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+ExternalMatch matchSize(ExternalCodec& codec, std::uint64_t bytes) {
+  using Step = ExternalStep;
+  const Aim aim{
+      .allowed = [=](const Step& s) { return s.bytes <= bytes; },
+      .tooFine = [=](const Step& s) { return s.bytes > bytes; },
+      .sufficient =
+          [=](const Step& s) { return double(s.bytes) >= kSufficientFill * double(bytes); },
+      .better = [](const Step& a, const Step& b) { return a.psnr > b.psnr; }};
+  return Search(codec, aim).run();
+}
+
+ExternalMatch matchPsnr(ExternalCodec& codec, const MatchGoal& goal) {
+  using Step = ExternalStep;
+  const double psnr = goal.psnr;
+  const Aim aim{.allowed = [=](const Step& s) { return s.psnr >= psnr; },
+                .tooFine = [=](const Step& s) { return s.psnr >= psnr; },
+                .sufficient = [=](const Step& s) { return s.psnr <= psnr + kSufficientExcess; },
+                .better = [](const Step& a, const Step& b) { return a.bytes < b.bytes; },
+                .measuresAll = true,
+                .active = goal.active};
+  return Search(codec, aim).run();
 }
 
 }  // namespace esvr::compare

@@ -8,11 +8,10 @@
 #include "report/units.h"
 
 namespace esvr::compare {
+
+// Rivals.
+
 namespace {
-
-using report::bytesText;
-
-constexpr double kVisible = 0.05;  // dB; smaller differences are 0.0 in a sentence
 
 double bytesOf(const TableRow& row) { return double(*row.bytes); }
 double psnrOf(const TableRow& row) { return row.metrics->psnrBox; }
@@ -35,6 +34,28 @@ const TableRow* bestRival(const TableRow& ours, const std::vector<TableRow>& row
     if (isRivalOf(ours, row) && (!best || isBetter(row, *best))) best = &row;
   return best;
 }
+
+}  // namespace
+
+double leadOf(const Duel& duel) { return psnrOf(*duel.ours) - psnrOf(*duel.rival); }
+
+std::vector<Duel> duelsOf(const TableRecord& record) {
+  std::vector<Duel> duels;
+  for (const auto& row : record.rows)
+    if (isOurs(row) && row.bytes && row.metrics)
+      duels.push_back({&row, bestRival(row, record.rows)});
+  std::stable_sort(duels.begin(), duels.end(),
+                   [](const Duel& a, const Duel& b) { return *a.ours->bytes < *b.ours->bytes; });
+  return duels;
+}
+
+// Sentences.
+
+namespace {
+
+using report::bytesText;
+
+constexpr double kVisible = 0.05;  // dB; smaller differences are 0.0 in a sentence
 
 /// A number with one decimal.
 std::string oneDecimal(double value) {
@@ -100,18 +121,6 @@ std::string sentenceOfUncontested(std::size_t files) {
 
 }  // namespace
 
-double leadOf(const Duel& duel) { return psnrOf(*duel.ours) - psnrOf(*duel.rival); }
-
-std::vector<Duel> duelsOf(const TableRecord& record) {
-  std::vector<Duel> duels;
-  for (const auto& row : record.rows)
-    if (isOurs(row) && row.bytes && row.metrics)
-      duels.push_back({&row, bestRival(row, record.rows)});
-  std::stable_sort(duels.begin(), duels.end(),
-                   [](const Duel& a, const Duel& b) { return *a.ours->bytes < *b.ours->bytes; });
-  return duels;
-}
-
 std::string findingOf(const TableRecord& record) {
   std::vector<Duel> lossy, contested, exact;
   for (const auto& duel : duelsOf(record)) {
@@ -126,6 +135,44 @@ std::string findingOf(const TableRecord& record) {
   if (!contested.empty()) text += sentenceOfUncontested(lossy.size() - contested.size());
   if (exact.empty()) return text;
   return text + (text.empty() ? "" : " ") + exactSentence(exact.front());
+}
+
+// The order of a page.
+
+PageOrder::PageOrder(const TableRecord& record) : record_(record), duels_(duelsOf(record)) {
+  for (const auto& duel : duels_) addSize(*duel.ours);
+  for (const auto& row : record.rows)
+    addUnplaced(row, {row.group, {}, row.matchedBytes.has_value()});
+}
+
+report::Emphasis PageOrder::emphasisOf(const TableRow& row) const {
+  if (row.group == kOurGroup) return report::Emphasis::kOurs;
+  const auto isRival = [&](const Duel& duel) { return duel.rival == &row; };
+  return std::any_of(duels_.begin(), duels_.end(), isRival) ? report::Emphasis::kRival
+                                                            : report::Emphasis::kNone;
+}
+
+/// Adds a row of ESVR, the rows of its size and those of its PSNR.
+void PageOrder::addSize(const TableRow& ours) {
+  const std::string size = "at most " + std::to_string(*ours.bytes) + " bytes (" +
+                           report::bytesText(double(*ours.bytes)) + ")";
+  addUnplaced(ours, {size, {}, true});
+  for (const auto& row : record_.rows)
+    if (row.matchedBytes == ours.bytes) addUnplaced(row, {size, {}, true});
+  for (const auto& row : record_.rows)
+    if (row.matchedPsnr == ours.metrics->psnrBox) addUnplaced(row, {row.group, {}, false});
+}
+
+/// Adds a row to the group of this heading if no group has the row yet.
+void PageOrder::addUnplaced(const TableRow& row, RowGroup group) {
+  const auto hasRow = [&](const RowGroup& other) {
+    return std::count(other.rows.begin(), other.rows.end(), &row) != 0;
+  };
+  if (std::any_of(groups_.begin(), groups_.end(), hasRow)) return;
+  const auto isIt = [&](const RowGroup& other) { return other.heading == group.heading; };
+  auto place = std::find_if(groups_.begin(), groups_.end(), isIt);
+  if (place == groups_.end()) place = groups_.insert(place, std::move(group));
+  place->rows.push_back(&row);
 }
 
 }  // namespace esvr::compare

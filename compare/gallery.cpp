@@ -2,15 +2,71 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <sstream>
+#include <utility>
 
+#include "cli/bytes_file.h"
+#include "cli/number.h"
+#include "cli/shell_word.h"
 #include "cli/stopwatch.h"
-#include "compare/row_renderer.h"
+#include "compare/external.h"
+#include "esvr/error.h"
+#include "esvr/flip.h"
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"
 #include "report/error_colors.h"
 #include "report/png_image.h"
 
 namespace esvr::compare {
+
+// Metrics of the user.
+
+namespace {
+
+std::filesystem::path written(const Image& image, const std::filesystem::path& path) {
+  constexpr bool kOverwrite = true;
+  const std::string png = report::toPng(image);
+  cli::writeBytes(path, std::as_bytes(std::span(png)), kOverwrite);
+  return path;
+}
+
+double lastNumber(const std::string& command, const std::string& text) {
+  std::istringstream words(text);
+  std::string word, last;
+  while (words >> word) last = word;
+  const auto value = cli::parseNumber(last);
+  if (!value)
+    throw RuntimeFailure("--lpips: " + command + " printed '" + last + "', which is not a number");
+  return *value;
+}
+
+}  // namespace
+
+PictureMetric::PictureMetric(std::string command, std::filesystem::path folder)
+    : command_(std::move(command)), folder_(std::move(folder)) {}
+
+double PictureMetric::of(const Image& reference, const Image& picture) const {
+  const auto command = command_ + " " +
+                       cli::shellWord(written(reference, folder_ / "reference.png").string()) +
+                       " " + cli::shellWord(written(picture, folder_ / "picture.png").string());
+  return lastNumber(command_, outputOf(command, "--lpips"));
+}
+
+// Pictures of voxels.
+
+std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume, NanoValues values,
+                                            const Device& device) {
+  if (device.kind == DeviceKind::kCpu) return makeVolumeRenderer(volume, device);
+  VolumeGrid grid;
+  grid.descriptor.background = volume.background;
+  grid.descriptor.transform = uniformTransform(1.0);  // pictures are drawn in index space
+  grid.volume = volume;
+  return makeNanoRenderer(makeNanoVolume(grid, values), device);
+}
+
+// All pictures of a table.
+
 namespace {
 
 ValueRange rangeOf(const SparseVolume& volume) {

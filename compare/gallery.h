@@ -2,12 +2,12 @@
 /// The option --images: compares pictures of every row with pictures of the reference from the same
 /// views.
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "compare/picture_metric.h"
-#include "esvr/flip.h"
+#include "compare/table_record.h"
 #include "esvr/image.h"
 #include "esvr/progress.h"
 #include "esvr/renderer.h"
@@ -28,19 +28,23 @@ struct GalleryOptions {
   std::string lpips;  ///< command for PictureMetric; empty: none
 };
 
-/// Mean figures over all pictures; the PSNR is that of the mean squared error.
-struct ImageFigures {
-  double psnr = 0.0, ssim = 0.0, flip = 0.0;
-  double fps = 0.0;                            ///< pictures per second by the median drawing time
-  std::optional<std::uint64_t> deviceBytes{};  ///< CUDA memory of the renderer
-  std::optional<double> lpips{};               ///< LPIPS if a command was given
+/// A metric of two pictures that a program of the user computes, for example LPIPS.
+class PictureMetric {
+ public:
+  /// \param command  shell command that gets the files of the reference and the picture as
+  ///                 arguments; the last word of its output is the figure
+  /// \param folder   folder for the two files, which are 8-bit PNG in front of black
+  PictureMetric(std::string command, std::filesystem::path folder);
+
+  /// \throws RuntimeFailure  the command fails, or its last word is not a number
+  [[nodiscard]] double of(const Image& reference, const Image& picture) const;
+
+ private:
+  std::string command_;
+  std::filesystem::path folder_;
 };
 
-/// The first picture of a row and its map of errors in the colors of report::errorScale().
-struct Shown {
-  std::string picturePng, errorPng;
-};
-
+/// The views of a table: draws the reference once, and compares the pictures of each row with it.
 class Gallery {
  public:
   /// Draws the reference on a device.
@@ -68,5 +72,11 @@ class Gallery {
   std::string referencePng_;
   ImageFigures referenceCost_;
 };
+
+/// Makes the renderer of a row's pictures: of a NanoVDB grid of this value type on a CUDA device,
+/// of the volume itself on the CPU.
+/// \throws DeviceError  as for makeNanoRenderer
+[[nodiscard]] std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume,
+                                                          NanoValues values, const Device& device);
 
 }  // namespace esvr::compare

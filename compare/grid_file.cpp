@@ -3,42 +3,44 @@
 #include <utility>
 
 #include "cli/names.h"
+#include "cli/sequence.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 
 namespace esvr::compare {
+
+// The grids of a file.
+
 namespace {
 
 constexpr std::uint64_t kVolumes = 2;  // the reference and the candidate
 
-ListedGrid listedGrid(const StoredGrid& grid) {
+ListedGrid listedGrid(const EsvrFile& file, const GridOfFile& place) {
+  if (place.isVector) {
+    const StoredVector& vector = file.vectors[place.index];
+    const StoredGrid& first = componentsOf(file, vector).front();
+    const bool ofDoubles = first.descriptor.valueType == ValueType::kDouble;
+    return {.name = vector.name,
+            .comparable = false,
+            .empty = first.activeVoxels == 0,
+            .valueType = ofDoubles ? "vec3d" : "vec3s",  // OpenVDB's names of the source's types
+            .ofEsvr = place,
+            .isVector = true};
+  }
+  if (place.isCarried) {
+    const GridSummary summary = inspectCarried(file.carried[place.index]);
+    return {.name = file.carried[place.index].name,
+            .comparable = summary.isScalar,
+            .empty = summary.activeVoxels == 0,
+            .valueType = summary.valueType,
+            .ofEsvr = place,
+            .isVector = summary.isVector};
+  }
+  const StoredGrid& grid = file.grids[place.index];
   return {.name = grid.descriptor.name,
           .empty = grid.activeVoxels == 0,
-          .valueType = cli::nameOf(grid.descriptor.valueType)};
-}
-
-ListedGrid listedGrid(const CarriedGrid& grid) {
-  const GridSummary summary = inspectCarried(grid);
-  return {.name = grid.name,
-          .comparable = summary.isScalar,
-          .empty = summary.activeVoxels == 0,
-          .valueType = summary.valueType,
-          .isVector = summary.isVector};
-}
-
-/// A grid of vectors; OpenVDB's name of its type is that of the source.
-ListedGrid listedGrid(const EsvrFile& file, const StoredVector& vector) {
-  const StoredGrid& first = componentsOf(file, vector).front();
-  return {.name = vector.name,
-          .comparable = false,
-          .empty = first.activeVoxels == 0,
-          .valueType = first.descriptor.valueType == ValueType::kDouble ? "vec3d" : "vec3s",
-          .isVector = true};
-}
-
-ListedGrid listedGrid(const EsvrFile& file, const GridOfFile& grid) {
-  if (grid.isVector) return listedGrid(file, file.vectors[grid.index]);
-  return grid.isCarried ? listedGrid(file.carried[grid.index]) : listedGrid(file.grids[grid.index]);
+          .valueType = cli::nameOf(grid.descriptor.valueType),
+          .ofEsvr = place};
 }
 
 }  // namespace
@@ -62,10 +64,7 @@ GridFile::GridFile(std::filesystem::path path, const EsvrFile& frame, cli::HostM
 
 void GridFile::listEsvr() {
   metadata_ = esvr_->metadata;
-  for (const auto& grid : gridsInOrder(*esvr_)) {
-    grids_.push_back(listedGrid(*esvr_, grid));
-    grids_.back().ofEsvr = grid;
-  }
+  for (const auto& grid : gridsInOrder(*esvr_)) grids_.push_back(listedGrid(*esvr_, grid));
   traits_ = cli::traitsOf(*esvr_);
   nameGrids();
 }
@@ -138,6 +137,39 @@ VectorGrid GridFile::readVectors(std::size_t g) const {
   const StoredVector& vector = esvr_->vectors.at(place.index);
   return decodeVector(vector.name, componentsOf(*esvr_, vector),
                       {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
+}
+
+// The frames of a sequence.
+
+std::unique_ptr<FrameSource> FrameSource::in(const std::string& path,
+                                             const cli::HostMemory& memory) {
+  const auto stored = cli::framesInFile(path);
+  const auto pattern = cli::FramePattern::ofInput(path);
+  if (!stored && !pattern) return nullptr;
+  std::unique_ptr<FrameSource> source(
+      new FrameSource(pattern ? *pattern : cli::FramePattern::whole(path), memory));
+  if (!stored) {
+    source->listing_ = cli::framesOnDisk(*pattern);
+    return source;
+  }
+  source->listing_.frames = *stored;
+  source->reader_ =
+      std::make_unique<SequenceReader>(path, ReadLimits{memory.maxBytes, memory.voxels});
+  return source;
+}
+
+GridFile FrameSource::open(cli::FrameNumber number) {
+  const std::filesystem::path path = pattern_.toRead(number);
+  if (!reader_) return GridFile(path, memory_);
+  return GridFile(path, reader_->read(number), memory_);
+}
+
+std::uint64_t FrameSource::bytesOf(const std::vector<cli::FrameNumber>& frames) const {
+  if (reader_) return reader_->fileBytes();
+  std::uint64_t bytes = 0;
+  for (const cli::FrameNumber frame : frames)
+    bytes += std::filesystem::file_size(pattern_.toRead(frame));
+  return bytes;
 }
 
 }  // namespace esvr::compare

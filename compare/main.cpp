@@ -7,7 +7,7 @@
 #include "cli/run_main.h"
 #include "compare/check.h"
 #include "compare/curves.h"
-#include "compare/program.h"
+#include "compare/options.h"
 #include "compare/table.h"
 
 namespace {

@@ -1,13 +1,66 @@
 #pragma once
 /// esvr-compare table: the paper's tables for any volume.
 
-#include "compare/table_options.h"
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cli/host_memory.h"
+#include "cli/log.h"
+#include "compare/external.h"
+#include "compare/gallery.h"
+#include "compare/options.h"
+#include "esvr/baseline.h"
+#include "esvr/coord.h"
 
 namespace esvr::compare {
+
+struct TableOptions {
+  cli::InputFiles inputs;  ///< reference, candidates and transfer functions
+  std::filesystem::path reference;
+  std::vector<std::filesystem::path> candidates;
+  std::optional<std::string> grid;  ///< default: the first grid with voxels
+  bool lossless = true, quantised = true, matched = true, zfp = true;
+  std::vector<BaselineSetting> settings;  ///< baselines of --row, which replace the others
+  std::vector<std::uint64_t> sizes;       ///< sizes to match besides the candidates'
+  std::vector<double> psnrs;              ///< PSNRs over the box to match, dB
+  std::vector<double> activePsnrs;        ///< PSNRs over the active voxels to match, dB
+  std::vector<std::uint64_t> fits;        ///< sizes for which ellipsoids are fitted
+  bool fitDefault = false;                ///< whether a fit with the default options is made
+  bool fitPaper = false;                  ///< whether a fit by the paper's method is made
+  std::vector<External> externals;
+  std::vector<ExternalCommand> commands;  ///< compressors that a command runs
+  int runs = 3;
+  std::uint64_t maxDense = 0;
+  std::optional<Box> box;
+  std::optional<double> peak;
+  std::string device;
+  GalleryOptions images;
+  ReportFiles files;
+  cli::HostMemory memory;  ///< memory that input may take
+  int threads = 0;
+  cli::Verbosity verbosity = cli::Verbosity::kNormal;
+  std::vector<std::string> commandLine;
+};
+
+/// All files that a run reads.
+[[nodiscard]] std::vector<std::filesystem::path> inputsOf(const TableOptions& options);
+
+/// \param argv  arguments, beginning with the command ("table")
+/// \return nothing if --help or --version was printed
+/// \throws UsageError  an option is invalid
+[[nodiscard]] std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv);
 
 /// Makes the rows, prints them and writes the reports.
 /// \throws BadInput  the files cannot be compared
 /// \throws RuntimeFailure  the run was interrupted; finished rows were printed and written
 void table(const TableOptions& options);
+
+/// The options and arguments for the reference and the candidates, which `curves` has, too.
+void addSceneOptions(cli::CommandLine& line);
+/// \throws UsageError  a value is out of range
+void readSceneOptions(const cli::Arguments& arguments, TableOptions& options);
 
 }  // namespace esvr::compare

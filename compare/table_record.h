@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "compare/gallery.h"
-#include "compare/grid_file.h"
+#include "esvr/coord.h"
+#include "esvr/fit.h"
 #include "esvr/metrics.h"
 
 namespace esvr::compare {
@@ -17,14 +17,25 @@ struct Timing {
   double median = 0.0, min = 0.0, max = 0.0;
   int runs = 0;
 };
-/// \param seconds  times of the runs, at least one
-[[nodiscard]] Timing timingOf(std::vector<double> seconds);
 
 /// A trial of the search for a row's setting.
 struct SearchStep {
   std::string setting;
   std::uint64_t bytes = 0;
   std::optional<double> psnr;
+};
+
+/// Mean figures over all pictures; the PSNR is that of the mean squared error.
+struct ImageFigures {
+  double psnr = 0.0, ssim = 0.0, flip = 0.0;
+  double fps = 0.0;                            ///< pictures per second by the median drawing time
+  std::optional<std::uint64_t> deviceBytes{};  ///< CUDA memory of the renderer
+  std::optional<double> lpips{};               ///< LPIPS if a command was given
+};
+
+/// The first picture of a row and its map of errors in the colors of report::errorScale().
+struct Shown {
+  std::string picturePng, errorPng;
 };
 
 /// Names of groups.
@@ -67,8 +78,5 @@ struct TableRecord {
   std::string drawnOn{};                        ///< name of the device that draws
   bool interrupted = false;
 };
-
-/// \throws RuntimeFailure  the run was interrupted; the text has the number of rows
-void requireAllRows(const TableRecord& record);
 
 }  // namespace esvr::compare

@@ -3,7 +3,7 @@
 
 #include <iosfwd>
 
-#include "compare/table_options.h"
+#include "compare/table.h"
 #include "compare/table_record.h"
 
 namespace esvr::compare {

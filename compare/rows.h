@@ -1,16 +1,20 @@
 #pragma once
-/// Makes the rows of a table, one after the other, from the same voxels.
+/// The rows of a table or of curves: the reference, the baselines that are compared with it, and
+/// the measurement of one row after the other from the same voxels.
 
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "compare/external_search.h"
-#include "compare/table_options.h"
+#include "compare/external.h"
+#include "compare/gallery.h"
+#include "compare/grid_file.h"
+#include "compare/table.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
 #include "esvr/convert.h"
-#include "esvr/device.h"
 
 namespace esvr::compare {
 
@@ -27,11 +31,71 @@ struct TableScene {
   const Gallery* gallery = nullptr;  ///< null: no pictures
 };
 
+/// A folder for temporary files in that of the variable TMPDIR, or in /var/tmp. The destructor
+/// removes it with its content.
+class ScratchFolder {
+ public:
+  /// \throws UsageError  TMPDIR is no folder
+  /// \throws RuntimeFailure  the folder cannot be made
+  ScratchFolder();
+  ~ScratchFolder();
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Reads and checks the reference, and owns the objects that a TableScene points to.
+class SceneFiles {
+ public:
+  /// \throws BadInput  the reference has no active voxel; else as for readGrid
+  SceneFiles(const TableOptions& options, const CancelToken& cancel);
+
+  [[nodiscard]] TableScene scene() const;
+  /// A record without rows.
+  [[nodiscard]] TableRecord record() const;
+
+ private:
+  const TableOptions& options_;
+  const CancelToken& cancel_;
+  GridFile file_;
+  std::size_t place_;
+  VolumeGrid reference_;
+  Box box_;
+  double peak_;
+  ScratchFolder folder_;
+  std::optional<Gallery> gallery_;
+};
+
+/// The baseline to which ratios refer.
+[[nodiscard]] BaselineSetting halfBlosc();
+
+[[nodiscard]] std::vector<BaselineSetting> losslessSettings();
+
+/// A setting and the name of its row.
+struct NamedSetting {
+  BaselineSetting setting;
+  std::string name;
+};
+[[nodiscard]] std::vector<NamedSetting> quantisedSettings(double peak);
+
+/// The forms for which the best setting for a size, or for a PSNR, is searched; none if --row names
+/// the baselines.
+[[nodiscard]] std::vector<BaselineSetting> sizeForms(const TableOptions& options);
+[[nodiscard]] std::vector<BaselineSetting> psnrForms(const TableOptions& options);
+/// Forms that are matched to a PSNR over the active voxels.
+[[nodiscard]] std::vector<BaselineSetting> activePsnrForms(const TableOptions& options);
+
+/// A fit that a row is to show.
 struct FitWish {
   std::optional<std::uint64_t> bytes{};  ///< size of the file; nothing: default options
   bool paper = false;                    ///< whether the paper's method is used, stored as float32
 };
 
+/// Makes one row after the other.
 class RowMaker {
  public:
   explicit RowMaker(const TableScene& scene);
@@ -72,7 +136,7 @@ class RowMaker {
   BaselineEncoder encoder_;
 };
 
-/// The name of a row: "NanoVDB FpN Zip", "ZFP accuracy".
-[[nodiscard]] std::string displayName(const BaselineSetting& setting);
+/// \throws RuntimeFailure  the run was interrupted; the text has the number of rows
+void requireAllRows(const TableRecord& record);
 
 }  // namespace esvr::compare

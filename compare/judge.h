@@ -1,5 +1,6 @@
 #pragma once
-/// Baselines of esvr-compare check: figures of an earlier run in a JSON file, for example
+/// Judges what `check` has measured, by the limits of the options and by a baseline. A baseline has
+/// figures of an earlier run in a JSON file, for example
 ///
 ///     {"schema": "esvr-baseline", "schema_version": 1,
 ///      "bytes": {"value": 21704, "tolerance": 217},
@@ -9,9 +10,18 @@
 
 #include <filesystem>
 
-#include "compare/check_record.h"
+#include "compare/check.h"
 
 namespace esvr::compare {
+
+/// Appends a line to the record's failures for every limit that a grid misses.
+void judgeLimits(const CheckOptions& options, CheckRecord& record);
+
+/// Appends a line if the file is larger than allowed.
+void judgeBytes(const CheckOptions& options, CheckRecord& record);
+
+/// Appends a line for every difference of the kinds that fail.
+void judgeDifferences(const CheckOptions& options, CheckRecord& record);
 
 /// Appends failures for figures that are worse by more than their tolerance, and notes for figures
 /// that are better and for grids that the baseline does not have.

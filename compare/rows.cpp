@@ -1,15 +1,18 @@
-#include "compare/measure.h"
-#include "compare/row_renderer.h"
+#include "compare/rows.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <system_error>
+#include <utility>
 
+#include "cli/host_memory.h"
 #include "cli/memory.h"
 #include "cli/names.h"
 #include "cli/shell_word.h"
 #include "cli/stopwatch.h"
 #include "cli/table.h"
-#include "compare/program.h"
+#include "compare/options.h"
 #include "esvr/compact.h"
 #include "esvr/error.h"
 #include "esvr/fit.h"
@@ -17,16 +20,75 @@
 #include "esvr/grid_names.h"
 
 namespace esvr::compare {
+
+// The reference.
+
+ScratchFolder::ScratchFolder() {
+  std::string pattern = cli::scratchFolder() / "esvr-compare-XXXXXX";
+  if (mkdtemp(pattern.data()) == nullptr)
+    throw RuntimeFailure("cannot make a temporary folder with the pattern " + pattern);
+  path_ = pattern;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
 namespace {
 
-/// Runs once to warm up and then `runs` times; returns the seconds of each of these.
-template <class Run>
-Timing timed(int runs, const Run& run) {
-  (void)run();
-  std::vector<double> seconds;
-  for (int i = 0; i < runs; ++i) seconds.push_back(run());
-  return timingOf(std::move(seconds));
+VolumeGrid readReference(const GridFile& file, std::size_t place) {
+  VolumeGrid reference = file.read(place);
+  if (activeVoxelCount(reference.volume) == 0)
+    throw BadInput(file.path().string() + ": grid \"" + file.grids()[place].uniqueName +
+                   "\" has no active voxel");
+  return reference;
 }
+
+}  // namespace
+
+SceneFiles::SceneFiles(const TableOptions& options, const CancelToken& cancel)
+    : options_(options),
+      cancel_(cancel),
+      file_(options.reference, options.memory),
+      place_(options.grid ? file_.find(*options.grid) : file_.firstWithVoxels()),
+      reference_(readReference(file_, place_)),
+      box_(options.box.value_or(activeBox(reference_.volume))),
+      peak_(options.peak.value_or(peakOf(reference_.volume))) {
+  if (options.images.views > 0)
+    gallery_.emplace(options.images, reference_.volume, selectDevice(options.device),
+                     folder_.path(), cancel);
+}
+
+TableScene SceneFiles::scene() const {
+  return {options_,
+          file_.grids()[place_].uniqueName,
+          reference_,
+          file_.metadata(),
+          box_,
+          peak_,
+          folder_.path(),
+          cancel_,
+          gallery_ ? &*gallery_ : nullptr};
+}
+
+TableRecord SceneFiles::record() const {
+  TableRecord record;
+  record.grid = file_.grids()[place_].uniqueName;
+  record.referenceBytes = file_.bytes();
+  record.box = box_;
+  record.peak = peak_;
+  record.activeVoxels = activeVoxelCount(reference_.volume);
+  if (!gallery_) return record;
+  record.referencePng = gallery_->referencePng();
+  record.referenceCost = gallery_->referenceCost();
+  record.drawnOn = deviceName(gallery_->device());
+  return record;
+}
+
+// The baselines.
+
+namespace {
 
 const char* nameOf(PackedForm form) {
   switch (form) {
@@ -60,22 +122,108 @@ const char* nameOf(PackedCodec codec) {
   return " raw";
 }
 
-std::vector<SearchStep> searchOf(const Match& match) {
-  std::vector<SearchStep> steps;
-  for (const auto& step : match.steps)
-    steps.push_back({toString(step.setting), step.bytes,
-                     std::isnan(step.psnr) ? std::nullopt : std::optional(step.psnr)});
-  return steps;
+/// The name of a row: "NanoVDB FpN Zip", "ZFP accuracy".
+std::string displayName(const BaselineSetting& setting) {
+  if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
+    return std::string(nameOf(packing->form)) + nameOf(packing->codec);
+  const auto& zfp = std::get<ZfpSetting>(setting.how);
+  const std::string name = zfp.mode == ZfpMode::kAccuracy ? "ZFP accuracy" : "ZFP precision";
+  return zfp.bricks ? name + " of bricks" : name;
 }
+
+constexpr PackedCodec kNone = PackedCodec::kNone, kZip = PackedCodec::kZip,
+                      kBlosc = PackedCodec::kBlosc;
+/// The tolerances of FpN in a table: the peak divided by these numbers.
+constexpr int kTolerances[] = {1024, 256, 64};
+
+BaselineSetting packed(PackedForm form, PackedCodec codec, double tolerance = 0.0) {
+  return {.how = VoxelPacking{form, codec, tolerance}};
+}
+
+BaselineSetting zfp(ZfpMode mode, bool bricks = false) {
+  return {.how = ZfpSetting{mode, 0.0, bricks}};
+}
+
+/// Forms of voxels and of ZFP, as far as the options want them.
+std::vector<BaselineSetting> formsOf(const TableOptions& options,
+                                     std::vector<BaselineSetting> matched,
+                                     const std::vector<BaselineSetting>& ofZfp) {
+  std::vector<BaselineSetting> forms;
+  if (!options.settings.empty()) return forms;
+  if (options.matched) forms = std::move(matched);
+  if (options.zfp && !zfpVersion().empty()) forms.insert(forms.end(), ofZfp.begin(), ofZfp.end());
+  return forms;
+}
+
+}  // namespace
+
+BaselineSetting halfBlosc() { return packed(PackedForm::kOpenVdbHalf, kBlosc); }
+
+std::vector<BaselineSetting> losslessSettings() {
+  using F = PackedForm;
+  return {packed(F::kOpenVdbFloat, kBlosc), packed(F::kOpenVdbFloat, kZip),
+          packed(F::kNanoFloat, kNone),     packed(F::kNanoFloat, kZip),
+          packed(F::kNanoFloat, kBlosc),    packed(F::kOpenVdbHalf, kBlosc),
+          packed(F::kOpenVdbHalf, kZip)};
+}
+
+std::vector<NamedSetting> quantisedSettings(double peak) {
+  std::vector<NamedSetting> settings;
+  const auto add = [&](const BaselineSetting& setting, const std::string& part) {
+    std::string name = displayName(setting);
+    if (!part.empty()) name.insert(name.rfind(' '), "/" + part);
+    settings.push_back({setting, name});
+  };
+  for (const PackedCodec codec : {kNone, kZip}) {
+    for (const PackedForm form :
+         {PackedForm::kNanoFp16, PackedForm::kNanoFp8, PackedForm::kNanoFp4})
+      add(packed(form, codec), "");
+    for (const int part : kTolerances)
+      add(packed(PackedForm::kNanoFpN, codec, peak / part), std::to_string(part));
+  }
+  return settings;
+}
+
+std::vector<BaselineSetting> sizeForms(const TableOptions& options) {
+  using F = PackedForm;
+  return formsOf(options,
+                 {packed(F::kOpenVdbHalf, kBlosc), packed(F::kNanoFloat, kZip),
+                  packed(F::kNanoFp16, kZip), packed(F::kNanoFp8, kZip), packed(F::kNanoFp4, kZip),
+                  packed(F::kNanoFpN, kZip), packed(F::kNanoFpN, kNone)},
+                 {zfp(ZfpMode::kAccuracy), zfp(ZfpMode::kPrecision)});
+}
+
+std::vector<BaselineSetting> psnrForms(const TableOptions& options) {
+  return formsOf(options, {packed(PackedForm::kNanoFpN, kZip)},
+                 {zfp(ZfpMode::kAccuracy), zfp(ZfpMode::kPrecision)});
+}
+
+std::vector<BaselineSetting> activePsnrForms(const TableOptions& options) {
+  return formsOf(options, {packed(PackedForm::kNanoFpN, kZip), packed(PackedForm::kNanoFp4, kZip)},
+                 {zfp(ZfpMode::kAccuracy), zfp(ZfpMode::kAccuracy, true)});
+}
+
+// The measurement.
+
+namespace {
+
+/// Runs once to warm up and then `runs` times. \return the statistics of the seconds of these
+template <class Run>
+Timing timed(int runs, const Run& run) {
+  (void)run();
+  std::vector<double> seconds;
+  for (int i = 0; i < runs; ++i) seconds.push_back(run());
+  std::sort(seconds.begin(), seconds.end());
+  const std::size_t n = seconds.size();
+  return {(seconds[(n - 1) / 2] + seconds[n / 2]) / 2, seconds.front(), seconds.back(), int(n)};
+}
+
+Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
 
 std::string settingOf(double bound) { return "bound=" + boundText(bound); }
 
-std::vector<SearchStep> searchOf(const ExternalMatch& match) {
-  std::vector<SearchStep> steps;
-  for (const auto& step : match.steps)
-    steps.push_back({settingOf(step.bound), step.bytes,
-                     std::isnan(step.psnr) ? std::nullopt : std::optional(step.psnr)});
-  return steps;
+SearchStep stepOf(std::string setting, std::uint64_t bytes, double psnr) {
+  return {std::move(setting), bytes, std::isnan(psnr) ? std::nullopt : std::optional(psnr)};
 }
 
 /// Index in EsvrFile::grids of the grid that has the reference's name; if only one grid of a file
@@ -96,14 +244,6 @@ void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& 
                    ": its active voxels and the reference's lie in boxes that do not meet");
 }
 
-/// The NanoVDB value type with which a row's voxels are drawn.
-NanoValues valuesOf(const BaselineSetting& setting) {
-  const auto* packing = std::get_if<VoxelPacking>(&setting.how);
-  return packing ? nanoValues(packing->form) : NanoValues::kFloat;
-}
-
-Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
-
 /// The curve of a fit, whose PSNR has the source's peak, with the peak of all rows.
 std::vector<TimedCurvePoint> withPeak(std::vector<TimedCurvePoint> curve, const TableScene& scene) {
   const double more = 20.0 * std::log10(scene.peak / peakOf(scene.reference.volume));
@@ -112,12 +252,6 @@ std::vector<TimedCurvePoint> withPeak(std::vector<TimedCurvePoint> curve, const 
     point.psnrActive += more;
   }
   return curve;
-}
-
-/// The value of --fit.
-std::string wordOf(const FitWish& wish) {
-  if (wish.paper) return "paper";
-  return wish.bytes ? std::to_string(*wish.bytes) : "default";
 }
 
 std::string sizeGroup(std::uint64_t bytes) { return "at " + std::to_string(bytes) + " bytes"; }
@@ -130,19 +264,7 @@ std::optional<double> psnrOverBoxOf(const MatchGoal& goal) {
   return goal.active ? std::nullopt : std::optional(goal.psnr);
 }
 
-std::uint64_t bytesOf(const GridFile& file, const std::filesystem::path& path, std::size_t grid) {
-  return file.grids().size() == 1 ? file.bytes() : cli::storedBytes(inspectEsvr(path), grid);
-}
-
 }  // namespace
-
-std::string displayName(const BaselineSetting& setting) {
-  if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
-    return std::string(nameOf(packing->form)) + nameOf(packing->codec);
-  const auto& zfp = std::get<ZfpSetting>(setting.how);
-  const std::string name = zfp.mode == ZfpMode::kAccuracy ? "ZFP accuracy" : "ZFP precision";
-  return zfp.bricks ? name + " of bricks" : name;
-}
 
 RowMaker::RowMaker(const TableScene& scene)
     : scene_(scene),
@@ -195,7 +317,8 @@ void RowMaker::measure(const BaselineSetting& setting, TableRow& row) {
   const cli::MemoryMeter decoding;
   row.decode = timed(scene_.options.runs, [&] { return encoder_.secondsToDecode(); });
   row.memory = std::max(row.memory, decoding.peakRise());
-  measureVoxels(encoder_.decode(), valuesOf(setting), row);
+  const auto* packing = std::get_if<VoxelPacking>(&setting.how);
+  measureVoxels(encoder_.decode(), packing ? nanoValues(packing->form) : NanoValues::kFloat, row);
 }
 
 TableRow RowMaker::baseline(const std::string& group, const BaselineSetting& setting,
@@ -211,7 +334,8 @@ TableRow RowMaker::matched(const BaselineSetting& like, const std::string& group
                            const std::function<Match()>& search) try {
   TableRow row{.name = displayName(like), .group = group};
   const Match match = search();
-  row.search = searchOf(match);
+  for (const auto& step : match.steps)
+    row.search.push_back(stepOf(toString(step.setting), step.bytes, step.psnr));
   if (match.found)
     measure(match.best.setting, row);
   else
@@ -267,7 +391,8 @@ TableRow RowMaker::matched(const ExternalCommand& command, const TableRow& like,
                                 .memory = scene_.options.memory,
                                 .cancel = &scene_.cancel});
   const ExternalMatch match = search(codec);
-  row.search = searchOf(match);
+  for (const auto& step : match.steps)
+    row.search.push_back(stepOf(settingOf(step.bound), step.bytes, step.psnr));
   if (match.found)
     measure(codec, match.best.bound, row);
   else
@@ -333,7 +458,7 @@ TableRow RowMaker::candidate(const std::filesystem::path& path) {
     throw BadInput(path.string() +
                    ": candidates must be .esvr files; --external takes other results");
   const std::size_t place = placeOf(*file.esvr(), path, scene_.gridName);
-  row.bytes = bytesOf(file, path, place);
+  row.bytes = file.grids().size() == 1 ? file.bytes() : cli::storedBytes(inspectEsvr(path), place);
   row.command = command(cli::shellWord(path.string()) + " --rows none");
   measureEsvr(path, row);
   return row;
@@ -353,7 +478,10 @@ Conversion RowMaker::convert(const FitWish& wish, std::uint64_t head) const {
 }
 
 TableRow RowMaker::fitted(const FitWish& wish) {
-  const std::string word = wordOf(wish);
+  const std::string word =  // the value of --fit
+      wish.paper   ? "paper"
+      : wish.bytes ? std::to_string(*wish.bytes)
+                   : "default";
   TableRow row{.name = "ESVR fitted, " + word, .group = kOurGroup, .fittedHere = true};
   row.command = command("--rows none --fit " + word);
   const auto path = scene_.folder / "fitted.esvr";
@@ -376,6 +504,12 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   measureEsvr(path, row);
   row.memory = std::max(row.memory, memory);
   return row;
+}
+
+void requireAllRows(const TableRecord& record) {
+  if (record.interrupted)
+    throw RuntimeFailure("interrupted; " + std::to_string(record.rows.size()) +
+                         " rows were made, the others are missing");
 }
 
 }  // namespace esvr::compare

@@ -1,4 +1,4 @@
-#include "compare/baseline.h"
+#include "compare/judge.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,41 @@
 #include "esvr/error.h"
 
 namespace esvr::compare {
+
+// Limits.
+
+void judgeLimits(const CheckOptions& options, CheckRecord& record) {
+  for (const CheckedGrid& grid : record.grids)
+    for (const Figure& figure : allFigures()) {
+      const auto& bound = options.limits[std::size_t(figure.id)];
+      const auto value = valueOf(grid.figures, figure);
+      if (!bound || !value || (figure.inValueUnits && grid.isLengths)) continue;
+      const double limit = bound->absolute(grid.range);
+      if (figure.higherIsBetter ? *value < limit : *value > limit)
+        record.failures.push_back("grid \"" + grid.name + "\": " + figure.header + " " +
+                                  textOf(figure, *value) + ", --" + figure.option + " " +
+                                  textOf(figure, limit));
+    }
+}
+
+void judgeBytes(const CheckOptions& options, CheckRecord& record) {
+  if (options.maxBytes && record.candidateBytes > *options.maxBytes)
+    record.failures.push_back(std::to_string(record.candidateBytes) + " bytes, --max-bytes " +
+                              std::to_string(*options.maxBytes));
+}
+
+void judgeDifferences(const CheckOptions& options, CheckRecord& record) {
+  const auto judge = [&](const std::string& where, const std::vector<Difference>& differences) {
+    for (const auto& difference : differences)
+      if (options.failOn.contains(difference.kind))
+        record.failures.push_back(where + difference.text);
+  };
+  judge("file ", record.fileDifferences);
+  for (const auto& grid : record.grids) judge("grid \"" + grid.name + "\": ", grid.differences);
+}
+
+// Baselines.
+
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -88,8 +123,8 @@ void tell(Verdict verdict, const std::string& text, CheckRecord& record) {
   if (verdict == Verdict::kBetter) record.notes.push_back(text + ": better");
 }
 
-void judgeGrid(const std::filesystem::path& path, const Json& stored, const CheckedGrid& grid,
-               CheckRecord& record) {
+void judgeFigures(const std::filesystem::path& path, const Json& stored, const CheckedGrid& grid,
+                  CheckRecord& record) {
   for (const Figure& figure : allFigures()) {
     const auto value = valueOf(grid.figures, figure);
     if (!stored.contains(figure.key)) continue;
@@ -106,7 +141,7 @@ void judgeGrid(const std::filesystem::path& path, const Json& stored, const Chec
   }
 }
 
-void judgeBytes(const std::filesystem::path& path, const Json& baseline, CheckRecord& record) {
+void judgeSize(const std::filesystem::path& path, const Json& baseline, CheckRecord& record) {
   if (!baseline.contains("bytes")) return;
   const Entry entry = entryOf(path, "bytes", baseline["bytes"]);
   tell(judge(false, entry, double(record.candidateBytes)),
@@ -144,11 +179,11 @@ Json gridEntry(const CheckedGrid& grid, const Json& old) {
 
 void judgeBaseline(const std::filesystem::path& path, CheckRecord& record) {
   const Json baseline = readBaseline(path);
-  judgeBytes(path, baseline, record);
+  judgeSize(path, baseline, record);
   const Json& stored = baseline["grids"];
   for (const auto& grid : record.grids) {
     if (stored.contains(grid.name))
-      judgeGrid(path, stored[grid.name], grid, record);
+      judgeFigures(path, stored[grid.name], grid, record);
     else
       record.notes.push_back("grid \"" + grid.name +
                              "\" is not in the baseline (--update adds it)");

@@ -1,13 +1,57 @@
-#include "compare/table_columns.h"
+#include "compare/report_parts.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "cli/table.h"
 #include "compare/figures.h"
+#include "report/html_page.h"
+#include "report/html_table.h"
+#include "report/units.h"
 
 namespace esvr::compare {
-namespace {
 
 using report::Cell;
+using report::Chart;
 using report::DataTable;
+using report::FigureTable;
+using report::Html;
 using report::Kind;
+using report::Series;
+
+// Sentences.
+
+std::string sceneLine(const TableRecord& record) {
+  return "grid \"" + record.grid + "\", " + std::to_string(record.activeVoxels) +
+         " active voxels, box " + toString(record.box.min) + " to " + toString(record.box.max) +
+         ", peak " + cli::shortNumber(record.peak);
+}
+
+std::string pictureLine(const TableRecord& record) {
+  if (!record.referenceCost) return {};
+  const ImageFigures& cost = *record.referenceCost;
+  std::string text = "Pictures drawn on " + record.drawnOn + ", the reference's at " +
+                     cli::shortNumber(cost.fps) + " pictures per second";
+  if (cost.deviceBytes)
+    text += ", as a NanoVDB float grid in " + cli::shortNumber(double(*cost.deviceBytes) / 1e6) +
+            " MB of the device";
+  return text + ".";
+}
+
+std::string rivalRule() {
+  constexpr double kPercent = 100.0;
+  return "The best rival is the row with the highest PSNR over the box among all rows that are not "
+         "more than " +
+         cli::shortNumber(kPercent * kSameSize) + " % larger than the file of ESVR.";
+}
+
+std::string interruption(const TableRecord& record) {
+  return record.interrupted ? "Interrupted: rows are missing." : "";
+}
+
+// Columns.
+
+namespace {
 
 template <auto Member>
 Cell metric(const TableRow& row, const TableRecord&) {
@@ -156,6 +200,113 @@ DataTable withoutEmptyColumns(const DataTable& table) {
         break;
       }
   return withColumns(table, keys);
+}
+
+// Duels.
+
+namespace {
+
+/// The figures of a duel, one in a line. Sizes say something only where both have no error.
+Html duelTable(const Duel& duel, const TableRecord& record) {
+  const bool ofOneSize = std::isfinite(duel.ours->metrics->psnrBox);
+  FigureTable figures{.sortable = false};
+  DataTable& table = figures.table;
+  table.columns = {
+      {"figure", "figure", Kind::kText}, {"ours", duel.ours->name}, {"rival", duel.rival->name}};
+  table.title = "The better figures are bold.";
+  for (const auto& column : tableColumns()) {
+    const Cell ours = column.of(*duel.ours, record), rival = column.of(*duel.rival, record);
+    if (column.better == Better::kNeither || report::exactText(ours).empty()) continue;
+    const bool counts = !(ofOneSize && isSize(column));
+    if (counts && isBetter(column, ours, rival)) figures.best.push_back({table.rows.size(), 1});
+    if (counts && isBetter(column, rival, ours)) figures.best.push_back({table.rows.size(), 2});
+    table.rows.push_back(
+        {column.column.meaning, cellText(column.column, ours), cellText(column.column, rival)});
+  }
+  return report::toHtml(figures);
+}
+
+/// The PSNR of ESVR and of its best rivals, a line for each file of ESVR.
+Html duelsTable(const std::vector<Duel>& duels) {
+  FigureTable figures{.sortable = false};
+  DataTable& table = figures.table;
+  table.title =
+      "PSNR over the box in dB: that of ESVR, that of its best rival, and the lead of ESVR.";
+  table.columns = {{"size", "size", Kind::kText, "size of the file of ESVR"},
+                   {"ours", "ESVR", Kind::kDecibels, "PSNR of ESVR, dB"},
+                   {"name", "best rival", Kind::kText},
+                   {"rival", "PSNR", Kind::kDecibels, "PSNR of the best rival, dB"},
+                   {"lead", "lead", Kind::kDecibels, "difference of both, dB"}};
+  for (const Duel& duel : duels) {
+    report::Row cells{report::bytesText(double(*duel.ours->bytes)), duel.ours->metrics->psnrBox,
+                      std::string("none"), Cell(), Cell()};
+    if (duel.rival) {
+      cells[2] = duel.rival->name;
+      cells[3] = duel.rival->metrics->psnrBox;
+      if (std::isfinite(leadOf(duel))) cells[4] = leadOf(duel);
+    }
+    table.rows.push_back(std::move(cells));
+  }
+  return report::toHtml(figures);
+}
+
+}  // namespace
+
+Html duelSection(const std::vector<Duel>& duels, const TableRecord& record) {
+  const auto hasRival = [](const Duel& duel) { return duel.rival != nullptr; };
+  if (std::none_of(duels.begin(), duels.end(), hasRival)) return {};
+  if (duels.size() > 1)
+    return report::section("duels", "ESVR and its best rivals", duelsTable(duels));
+  return report::section("duel", "ESVR and its best rival", duelTable(duels.front(), record));
+}
+
+// Charts.
+
+namespace {
+
+Chart errorChart(const std::string& title, const report::ChartAxis& x) {
+  return {.title = title,
+          .x = x,
+          .y = {"RMS error over the box, % of the peak", report::Unit::kPercent, true},
+          .decibels = true};
+}
+
+Series& seriesNamed(const std::string& name, Chart& chart) {
+  const auto named = [&](const Series& series) { return series.name == name; };
+  const auto found = std::find_if(chart.series.begin(), chart.series.end(), named);
+  if (found != chart.series.end()) return *found;
+  chart.series.push_back({.name = name, .joined = false});
+  return chart.series.back();
+}
+
+}  // namespace
+
+Chart errorOverBytes(const std::string& title) {
+  return errorChart(title, {"size of the file", report::Unit::kBytes, true});
+}
+
+Chart errorOverSeconds(const std::string& title) {
+  return errorChart(title, {"run time", report::Unit::kSeconds, true});
+}
+
+report::Point errorPoint(double x, double psnr, const std::string& note) {
+  constexpr double kPercent = 100.0;
+  return {x, kPercent * std::pow(10.0, -psnr / 20.0),
+          cli::decibels(psnr) + " dB" + (note.empty() ? "" : "\n" + note)};
+}
+
+Chart familiesOverBytes(const TableRecord& record) {
+  Chart chart = errorOverBytes("All rows but those without an error");
+  for (const auto& row : record.rows) {
+    if (!row.bytes || !row.metrics) continue;
+    // A family has the first word of its rows' names: OpenVDB, NanoVDB, ZFP.
+    const bool isOurs = row.group == kOurGroup;
+    Series& series =
+        seriesNamed(isOurs ? kOurGroup : row.name.substr(0, row.name.find(' ')), chart);
+    if (isOurs) series.emphasis = report::Emphasis::kOurs;
+    series.points.push_back(errorPoint(double(*row.bytes), row.metrics->psnrBox, row.name));
+  }
+  return chart;
 }
 
 }  // namespace esvr::compare
