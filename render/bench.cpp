@@ -10,9 +10,17 @@
 #include "cli/stopwatch.h"
 #include "cli/table.h"
 #include "esvr/image_metrics.h"
-#include "render/supersample.h"
 
 namespace esvr::render {
+
+Image drawSupersampled(Renderer& renderer, RenderOptions options, int samples) {
+  if (samples == 1) return renderer.draw(options);
+  options.lod = LevelOfDetail::kOff;
+  options.resolution.width *= samples;
+  options.resolution.height *= samples;
+  return meansOfSquares(renderer.draw(options), samples);
+}
+
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -69,11 +77,6 @@ Times timed(Renderer& renderer, const RenderOptions& options, int views, bool co
   return times;
 }
 
-/// Draws a turn, after which the renderer has decoded what its views show.
-void warmUp(Renderer& renderer, const RenderOptions& options, int views) {
-  (void)timed(renderer, options, views, false);
-}
-
 Json figures(const Times& t) {
   const double drawMs = median(t.drawMs);
   return {{"fps_median", 1e3 / median(t.frameMs)},
@@ -103,7 +106,7 @@ Json meanAndMin(const std::vector<double>& v) {
 
 /// The figures of a renderer that has decoded what it draws, and of one that has decoded nothing.
 Json measured(Renderer& renderer, const RenderOptions& options, int views) {
-  warmUp(renderer, options, views);
+  (void)timed(renderer, options, views, false);  // decodes what the views show
   Json report = figures(timed(renderer, options, views, false));
   const Times cold = timed(renderer, options, std::min(views, kCold), true);
   report["cold_fps_median"] = 1e3 / median(cold.frameMs);

@@ -1,5 +1,6 @@
 #pragma once
-/// The option --bench: measures the speed, memory and quality of drawing.
+/// The option --bench: measures the speed, memory and quality of drawing; and the reference
+/// pictures of --ref.
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -20,6 +21,10 @@ struct Benched {
 /// \throws       as for Renderer::draw
 [[nodiscard]] nlohmann::ordered_json bench(const Benched& benched, const RenderOptions& options,
                                            int views, const cli::Log& log);
+
+/// Draws a reference picture, without levels of detail if a pixel has several rays.
+/// \param samples  rays along the side of a pixel
+[[nodiscard]] Image drawSupersampled(Renderer& renderer, RenderOptions options, int samples);
 
 /// A number for a JSON file. Infinity becomes null, because JSON cannot express it.
 [[nodiscard]] nlohmann::ordered_json jsonNumber(double value);

@@ -8,8 +8,9 @@
 
 namespace esvr::render {
 
-/// The camera of a JSON object. Its optional keys are "eye", "center" and "up" (three numbers each), "fov",
-/// "height", and "orthographic" (true or false; the default is true if "height" is given).
+/// The camera of a JSON object. Its optional keys are "eye", "center" and "up" (three numbers
+/// each), "fov", "height", and "orthographic" (true or false; the default is true if "height" is
+/// given).
 /// \throws BadInput  it is no object, a key is unknown, or a value has the wrong form
 [[nodiscard]] CameraWish cameraWish(const nlohmann::json& content);
 

@@ -20,7 +20,7 @@ namespace esvr::render {
 namespace {
 
 using Bytes = std::vector<std::byte>;
-constexpr std::size_t kChannels = 4;
+constexpr std::size_t kExrChannels = 4;
 
 /// An output file in memory. It can seek, because OpenEXR goes back to fill in its line table.
 class ByteStream final : public Imf::OStream {
@@ -48,7 +48,7 @@ float linearLight(float color) {
 
 std::vector<float> linearPixels(const Image& image) {
   std::vector<float> pixels = image.rgba;
-  for (std::size_t i = 0; i < pixels.size(); i += kChannels) {
+  for (std::size_t i = 0; i < pixels.size(); i += kExrChannels) {
     const float alpha = pixels[i + 3];
     for (std::size_t c = 0; c < 3; ++c)
       pixels[i + c] = alpha > 0.0f ? alpha * linearLight(pixels[i + c] / alpha) : 0.0f;
@@ -59,7 +59,7 @@ std::vector<float> linearPixels(const Image& image) {
 /// The distances of a depth picture, stored in the first of every four floats as in its pixels.
 std::vector<float> depths(const Image& image) {
   std::vector<float> pixels = image.rgba;
-  for (std::size_t i = 0; i < pixels.size(); i += kChannels)
+  for (std::size_t i = 0; i < pixels.size(); i += kExrChannels)
     if (pixels[i + 3] == 0.0f) pixels[i] = std::numeric_limits<float>::infinity();
   return pixels;
 }
@@ -70,7 +70,7 @@ Bytes written(const Image& image, std::vector<float> pixels,
   Imf::addComments(header, text.comment);
   header.insert("software", Imf::StringAttribute(text.software));
   Imf::FrameBuffer buffer;
-  const std::size_t ofPixel = kChannels * sizeof(float);
+  const std::size_t ofPixel = kExrChannels * sizeof(float);
   for (std::size_t c = 0; c < channels.size(); ++c) {
     header.channels().insert(channels[c], Imf::Channel(Imf::FLOAT));
     buffer.insert(channels[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(&pixels[c]), ofPixel,

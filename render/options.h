@@ -87,6 +87,16 @@ struct Options {
   std::vector<std::string> commandLine;  ///< the command as given, which pictures and reports hold
 };
 
+/// A clip box around a slab of one voxel's thickness, which is unbounded along the other axes.
+/// \param axis   0, 1 or 2 for x, y or z
+/// \param place  middle of the slab along the axis
+[[nodiscard]] inline PlaceBox sliceBox(std::size_t axis, double place) {
+  constexpr double kEverywhere = 1e9;  // voxels; larger than any coordinate in a grid
+  PlaceBox box{{-kEverywhere, -kEverywhere, -kEverywhere}, {kEverywhere, kEverywhere, kEverywhere}};
+  box.low[axis] = place - 0.5, box.high[axis] = place + 0.5;
+  return box;
+}
+
 /// Parses the command line. \return nothing if --help or --version was printed
 /// \throws UsageError  the options are wrong
 /// \throws BadInput    the file of a transfer function or camera is wrong

@@ -9,6 +9,9 @@
 #include "esvr/vdb_io.h"
 
 namespace esvr::render {
+
+// Reading.
+
 namespace {
 
 /// The first grid that is no component of vectors, or else the first one.
@@ -89,11 +92,16 @@ std::vector<std::size_t> placesOf(const EsvrFile& file, const SceneFile& from) {
   return places;
 }
 
+/// The content of an .esvr file without the bytes of carried grids.
+EsvrFile contentOf(const SceneFile& file) {
+  ReadLimits limits{file.memory.maxBytes, file.memory.voxels};
+  limits.carriedBytes = false;
+  return readEsvr(file.path, limits);
+}
+
 /// Reads grids of an .esvr file.
 std::vector<Scene> encoded(const SceneFile& from) {
-  ReadLimits limits{from.memory.maxBytes, from.memory.voxels};
-  limits.carriedBytes = false;
-  EsvrFile file = readEsvr(from.path, limits);
+  EsvrFile file = contentOf(from);
   const auto places = placesOf(file, from);
   const auto names = namesOfStored(file);
   std::vector<Scene> scenes;
@@ -117,23 +125,6 @@ std::optional<std::vector<Scene>> scenesBy(const EsvrFile& frame, const SceneFil
     scenes.push_back(make(frame.grids[place], names[place]));
   requireOneTransform(scenes, file.path);
   return scenes.front().box.empty() ? std::nullopt : std::optional(std::move(scenes));
-}
-
-/// Whether a grid of ellipsoids has so much empty space between its voxels that the table of its blocks
-/// of 64^3 voxels, by which rays find bricks (render/brick_table.h), would be too large. Such a grid is
-/// decoded at once, and its bricks are found by a search.
-bool liesFarApart(const Scene& scene) {
-  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
-  constexpr double kBlockSide = 64.0;
-  const auto* const field = std::get_if<Field>(&scene.content);
-  if (field == nullptr || !scene.encoded) return false;
-  const auto blocks = [](std::int32_t low, std::int32_t high) {
-    return (double(high) - double(low)) / kBlockSide + 2.0;
-  };
-  const Box& box = scene.box;
-  return blocks(box.min.x, box.max.x) * blocks(box.min.y, box.max.y) *
-             blocks(box.min.z, box.max.z) >
-         kMostBlocks;
 }
 
 /// The grids of a .vdb or .nvdb file.
@@ -271,23 +262,13 @@ std::optional<std::string> firstDrawable(const std::filesystem::path& path) {
   return GridsOfVdb(file).firstDrawableName();
 }
 
-namespace {
-
-EsvrFile readFrameFile(const SceneFile& file) {
-  ReadLimits limits{file.memory.maxBytes, file.memory.voxels};
-  limits.carriedBytes = false;
-  return readEsvr(file.path, limits);
-}
-
-}  // namespace
-
 std::optional<std::vector<Scene>> readFrame(const SceneFile& file) {
-  return file.path.extension() == ".esvr" ? scenesOf(readFrameFile(file), file)
+  return file.path.extension() == ".esvr" ? scenesOf(contentOf(file), file)
                                           : GridsOfVdb(file).frame();
 }
 
 std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file) {
-  if (file.path.extension() == ".esvr") return outlinesOf(readFrameFile(file), file);
+  if (file.path.extension() == ".esvr") return outlinesOf(contentOf(file), file);
   auto scenes = GridsOfVdb(file).frame();
   if (scenes)
     for (Scene& scene : *scenes) scene.content = VolumeGrid{};
@@ -302,6 +283,29 @@ void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
     scenes[i].data.expand(other.data);
   }
 }
+
+// Drawing.
+
+namespace {
+
+/// Whether a grid of ellipsoids has so much empty space between its voxels that the table of its
+/// blocks of 64^3 voxels, by which rays find bricks, would be too large. Such a grid is decoded at
+/// once, and its bricks are found by a search.
+bool liesFarApart(const Scene& scene) {
+  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
+  constexpr double kBlockSide = 64.0;
+  const auto* const field = std::get_if<Field>(&scene.content);
+  if (field == nullptr || !scene.encoded) return false;
+  const auto blocks = [](std::int32_t low, std::int32_t high) {
+    return (double(high) - double(low)) / kBlockSide + 2.0;
+  };
+  const Box& box = scene.box;
+  return blocks(box.min.x, box.max.x) * blocks(box.min.y, box.max.y) *
+             blocks(box.min.z, box.max.z) >
+         kMostBlocks;
+}
+
+}  // namespace
 
 SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSettings& s) {
   if (scenes.size() == 1) {

@@ -60,8 +60,8 @@ struct SceneFile {
 /// The name of the first grid of a .vdb or .nvdb file that can be drawn; nothing if there is none.
 [[nodiscard]] std::optional<std::string> firstDrawable(const std::filesystem::path& path);
 
-/// The same as scenesOf without the voxels that the grids may store, which is enough for a camera and transfer
-/// functions.
+/// The same as scenesOf without the voxels that the grids may store, which is enough for a camera
+/// and transfer functions.
 [[nodiscard]] std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame,
                                                            const SceneFile& file);
 
