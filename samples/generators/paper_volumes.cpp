@@ -5,11 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "generators/fit_tubes.h"
 #include "generators/hash_noise.h"
-#include "generators/soft_edge.h"
 #include "generators/tubes.h"
-#include "generators/voxelise.h"
 
 namespace esvr::samples {
 namespace {
@@ -57,11 +54,9 @@ class SoftShape {
 template <class Solid>
 SparseVolume makeSoft(Solid solid, double edge, const SampleOptions& options) {
   const int last = options.resolution;  // a soft edge reaches one voxel beyond the cube
-  return voxelise(SoftShape<Solid>(solid, options.resolution, edge),
-                  {.box = {{-1, -1, -1}, {last, last, last}},
-                   .background = 0.0f,
-                   .maxBricks = options.limits.maxBricks,
-                   .cancel = options.limits.cancel});
+  return voxelise(
+      SoftShape<Solid>(solid, options.resolution, edge),
+      {.box = {{-1, -1, -1}, {last, last, last}}, .background = 0.0f, .limits = options.limits});
 }
 
 struct EightChunks {

@@ -3,7 +3,7 @@
 /// Type Comparison'). The paper shows slices and gives no formulas; these volumes are similar.
 
 #include "esvr/sparse_volume.h"
-#include "generators/sample_options.h"
+#include "generators/voxelise.h"
 
 namespace esvr::samples {
 

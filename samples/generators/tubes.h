@@ -1,6 +1,7 @@
 #pragma once
-/// Soft-edged tubes, which look like vessels and neurons in a scan.
+/// Soft-edged tubes, which look like vessels and neurons in a scan; and a tree of them.
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -8,7 +9,6 @@
 #include <vector>
 
 #include "esvr/coord.h"
-#include "generators/sample_options.h"
 #include "generators/vec3.h"
 #include "generators/voxelise.h"
 
@@ -23,6 +23,13 @@ struct Tube {
 
 /// The exact distance of a point to the surface, negative inside.
 [[nodiscard]] double signedDistance(const Tube& tube, Vec3 p);
+
+/// 1 for distance <= -edge / 2, 0 for distance >= edge / 2, and smooth between.
+/// \param distance  distance to the surface, negative inside
+inline float softEdge(double distance, double edge) {
+  const double t = std::clamp(0.5 - distance / edge, 0.0, 1.0);
+  return float(t * t * (3.0 - 2.0 * t));
+}
 
 /// The union of tubes: 1 inside, with a soft edge of `edge` voxels to 0 outside.
 class TubeShape {
@@ -50,5 +57,30 @@ inline constexpr double kDefaultEdge = 2.0;  ///< width of a soft edge, voxels
 /// Makes a volume with background 0, in which voxels above 0 are active.
 [[nodiscard]] SparseVolume voxeliseTubes(std::span<const Tube> tubes, double edge,
                                          const Limits& limits);
+
+/// How tubes are scaled from their own units to voxels.
+struct TubeScale {
+  int resolution = 128;     ///< voxels along the longest side of the tubes' box
+  double minRadius = 0.75;  ///< voxels: thinner tubes are thickened to it
+  int margin = 1;           ///< voxels kept free for soft edges below the smallest corner
+};
+
+struct ScaledTubes {
+  std::vector<Tube> tubes;  ///< index coordinates, smallest corner at `margin`
+  double voxelSize = 1.0;   ///< side of a voxel in the units of the tubes
+  Vec3 origin;              ///< position of index (0, 0, 0) in the units of the tubes
+};
+
+/// \throws BadInput  the tubes have no extent
+[[nodiscard]] ScaledTubes fitTubes(std::span<const Tube> tubes, const TubeScale& scale);
+
+/// The smallest radius of a tube in voxels; thinner tubes would have gaps.
+inline constexpr double kThinnestTube = 0.75;
+
+/// The tubes of branching vessels, whose longest side is `resolution` voxels. The tree is the same
+/// for every resolution, except that no tube is thinner than kThinnestTube.
+[[nodiscard]] std::vector<Tube> treeTubes(const SampleOptions& options);
+
+[[nodiscard]] SparseVolume makeTree(const SampleOptions& options);
 
 }  // namespace esvr::samples

@@ -1,6 +1,7 @@
 #pragma once
-/// Converts a shape to a sparse volume: an octree is searched for bricks with active voxels, which
-/// are then filled. Time and memory are proportional to the active voxels, not to the bounding box.
+/// What all generators have: their options, and the conversion of a shape to a sparse volume. An
+/// octree is searched for bricks with active voxels, which are then filled. Time and memory are
+/// proportional to the active voxels, not to the bounding box.
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -21,6 +22,20 @@
 
 namespace esvr::samples {
 
+/// Limits of a generation.
+struct Limits {
+  std::uint64_t maxBricks = std::numeric_limits<std::uint64_t>::max();  ///< then DeviceError
+  const CancelToken* cancel = nullptr;                                  ///< then Cancelled
+};
+
+struct SampleOptions {
+  int resolution = 128;  ///< voxels along the longest side of what the sample shows
+  std::uint64_t seed = 1;
+  int frame = 0;  ///< frame of a sample that moves (SampleKind::moves), from 0
+  Limits limits{};
+};
+
+/// A voxel of a shape.
 struct Sample {
   float value = 0.0f;
   bool active = false;
@@ -44,8 +59,7 @@ concept Shape = requires(const S& shape, const Ball& ball, Vec3 p) {
 struct VoxeliseOptions {
   Box box;  ///< holds all active voxels
   float background = 0.0f;
-  std::uint64_t maxBricks = std::numeric_limits<std::uint64_t>::max();
-  const CancelToken* cancel = nullptr;
+  Limits limits{};
 };
 
 /// A brick with active voxels, and the shape narrowed to it.
@@ -122,7 +136,7 @@ class BrickSearch {
 
  private:
   void descend(const Cell& cell, const S& shape) {
-    if (options_.cancel && options_.cancel->cancelled()) throw Cancelled();
+    if (options_.limits.cancel && options_.limits.cancel->cancelled()) throw Cancelled();
     std::optional<S> narrowed = shape.within(cell.ball());
     if (!narrowed) return;
     if (cell.level == 0) return keep(cell.place, std::move(*narrowed));
@@ -131,8 +145,8 @@ class BrickSearch {
 
   void keep(Coord brick, S shape) {
     if (!anyActive(shape, brick)) return;
-    if (found_.fetch_add(1) >= options_.maxBricks)
-      throw DeviceError("the volume has more than " + std::to_string(options_.maxBricks) +
+    if (found_.fetch_add(1) >= options_.limits.maxBricks)
+      throw DeviceError("the volume has more than " + std::to_string(options_.limits.maxBricks) +
                         " bricks of 8^3 voxels, which is more than fits into memory");
     parts_.local().push_back({brick, std::move(shape)});
   }
@@ -162,8 +176,7 @@ Coord smallestBrick(const std::vector<ShapedBrick<S>>& bricks) {
 
 /// Converts a shape. The result is bit-identical for any number of threads. The memory is that of
 /// the volume (2124 bytes for each brick) and of one narrowed shape for each brick.
-/// \throws Cancelled  options.cancel was set
-/// \throws DeviceError  the volume has more than maxBricks
+/// \throws Cancelled, DeviceError  as Limits says
 template <Shape S>
 SparseVolume voxelise(const S& shape, const VoxeliseOptions& options) {
   SparseVolume volume;
@@ -177,7 +190,7 @@ SparseVolume voxelise(const S& shape, const VoxeliseOptions& options) {
   volume.active.resize(found.size());
   volume.values.resize(found.size() * kBrickVoxels);
   tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t b) {
-    if (options.cancel && options.cancel->cancelled()) throw Cancelled();
+    if (options.limits.cancel && options.limits.cancel->cancelled()) throw Cancelled();
     volume.bricks[b] = found[b].brick - low;
     detail::fillBrick(found[b], volume.brickValues(b), volume.active[b]);
   });

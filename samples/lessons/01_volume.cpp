@@ -9,7 +9,6 @@
 
 #include <cstdio>
 
-#include "check.h"
 #include "esvr/sparse_volume.h"
 #include "ring.h"
 

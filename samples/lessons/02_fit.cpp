@@ -5,7 +5,6 @@
 
 #include <cstdio>
 
-#include "check.h"
 #include "esvr/fit.h"
 #include "ring.h"
 

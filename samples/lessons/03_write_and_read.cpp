@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "check.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/fit.h"

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <vector>
 
-#include "check.h"
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "ring.h"

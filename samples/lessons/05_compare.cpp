@@ -5,7 +5,6 @@
 
 #include <cstdio>
 
-#include "check.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "check.h"
 #include "esvr/error.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"

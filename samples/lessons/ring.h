@@ -1,8 +1,11 @@
 #pragma once
-// The volume of the lessons: a soft ring, built as lesson 1 explains.
+// The volume of the lessons: a soft ring, built as lesson 1 explains; and the check of their
+// claims, because the lessons are tests as well.
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <vector>
 
 #include "esvr/sparse_volume.h"
@@ -29,4 +32,9 @@ inline esvr::SparseVolume makeRing() {
         bricks.push_back(brick);
       }
   return esvr::makeVolume(std::move(bricks), 0.0f);  // drops bricks without an active voxel
+}
+
+inline void check(bool condition, const char* claim) {
+  std::printf("%s: %s\n", condition ? "true" : "FALSE", claim);
+  if (!condition) std::exit(EXIT_FAILURE);
 }

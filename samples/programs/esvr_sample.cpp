@@ -12,9 +12,8 @@
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"
 #include "esvr/error.h"
-#include "kinds/sample_kinds.h"
-#include "programs/memory_limit.h"
-#include "programs/write_output.h"
+#include "generators/sample_kinds.h"
+#include "sample_output.h"
 
 namespace {
 
@@ -84,13 +83,6 @@ std::vector<std::filesystem::path> outputsOf(const cli::Arguments& arguments,
   return paths;
 }
 
-/// Writes one frame.
-void write(const samples::Output& output, const samples::SampleKind& kind,
-           const samples::SampleOptions& options, const cli::Log& log) {
-  const samples::SampleFile file = kind.make(options);
-  samples::writeOutput(output, file.metadata, file.grids, log);
-}
-
 int run(int argc, char** argv) {
   const auto arguments = commandLine().parse(argc, argv);
   if (!arguments) return 0;
@@ -114,13 +106,15 @@ int run(int argc, char** argv) {
 
   const cli::ThreadLimit threads(arguments->threads);
   const cli::Interrupts interrupts;
-  for (std::size_t f = first; f <= last; ++f)
-    write({paths[f], overwrite}, kind,
-          {.resolution = resolution,
-           .seed = std::uint64_t(seed),
-           .frame = int(f),
-           .limits = {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()}},
-          cli::Log(kName, arguments->verbosity));
+  const cli::Log log(kName, arguments->verbosity);
+  for (std::size_t f = first; f <= last; ++f) {
+    const samples::SampleFile file = kind.make(
+        {.resolution = resolution,
+         .seed = std::uint64_t(seed),
+         .frame = int(f),
+         .limits = {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()}});
+    samples::writeOutput({paths[f], overwrite}, file.metadata, file.grids, log);
+  }
   return 0;
 }
 

@@ -13,12 +13,10 @@
 #include "cli/output.h"
 #include "cli/run_main.h"
 #include "cli/thread_limit.h"
-#include "generators/fit_tubes.h"
-#include "generators/tree.h"
-#include "kinds/density_grid.h"
-#include "programs/memory_limit.h"
-#include "programs/write_output.h"
-#include "swc/skeleton.h"
+#include "generators/sample_kinds.h"
+#include "generators/skeleton.h"
+#include "generators/tubes.h"
+#include "sample_output.h"
 
 namespace {
 

@@ -1,6 +1,6 @@
 // Plan: every kind has grids that can be written, with the right names, classes and metadata.
 
-#include "kinds/sample_kinds.h"
+#include "generators/sample_kinds.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

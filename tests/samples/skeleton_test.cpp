@@ -1,7 +1,7 @@
 // Plan: SWC text becomes a skeleton, every wrong line is refused with its number, and the tubes and
 // pieces of a skeleton are right.
 
-#include "swc/skeleton.h"
+#include "generators/skeleton.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -10,7 +10,6 @@
 #include <limits>
 
 #include "esvr/error.h"
-#include "generators/fit_tubes.h"
 #include "generators/hash_noise.h"
 
 namespace esvr::samples {

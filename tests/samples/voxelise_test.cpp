@@ -5,10 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "generators/blobs.h"
-#include "generators/level_set.h"
-#include "generators/plume.h"
-#include "generators/tree.h"
+#include "generators/shapes.h"
+#include "generators/tubes.h"
 
 namespace esvr::samples {
 namespace {

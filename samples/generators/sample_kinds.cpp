@@ -1,4 +1,4 @@
-#include "kinds/sample_kinds.h"
+#include "generators/sample_kinds.h"
 
 #include <algorithm>
 #include <array>
@@ -7,14 +7,23 @@
 #include <utility>
 
 #include "esvr/error.h"
-#include "generators/blobs.h"
-#include "generators/level_set.h"
 #include "generators/paper_volumes.h"
-#include "generators/plume.h"
-#include "generators/tree.h"
-#include "kinds/density_grid.h"
+#include "generators/shapes.h"
+#include "generators/tubes.h"
 
 namespace esvr::samples {
+
+VolumeGrid densityGrid(SparseVolume volume, const Transform& transform, const std::string& name) {
+  VolumeGrid grid;
+  grid.descriptor.name = name;
+  grid.descriptor.gridClass = GridClass::kFogVolume;
+  grid.descriptor.valueType = ValueType::kFloat;
+  grid.descriptor.background = double(volume.background);
+  grid.descriptor.transform = transform;
+  grid.volume = std::move(volume);
+  return grid;
+}
+
 namespace {
 
 constexpr const char* kCreator = "esvr-sample";

@@ -7,7 +7,7 @@
 
 #include "esvr/grid_descriptor.h"
 #include "esvr/vdb_io.h"
-#include "generators/sample_options.h"
+#include "generators/voxelise.h"
 
 namespace esvr::samples {
 
@@ -30,5 +30,9 @@ struct SampleKind {
 
 /// \throws UsageError  the name is unknown; the text lists the known names
 [[nodiscard]] const SampleKind& sampleKind(const std::string& name);
+
+/// Makes a fog volume of float values.
+[[nodiscard]] VolumeGrid densityGrid(SparseVolume volume, const Transform& transform,
+                                     const std::string& name = "density");
 
 }  // namespace esvr::samples
