@@ -1,24 +1,30 @@
 #pragma once
-/// What the classes of the Python module hold.
+/// What the classes of the Python module hold, and long calls that Ctrl-C ends.
 
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
 #include <array>
+#include <chrono>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "esvr/container.h"
 #include "esvr/memory_limit.h"
+#include "esvr/progress.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::python {
 
 namespace py = pybind11;
 
-/// esvr.Volume: voxels and the other properties of their grid. It does not change after it was made.
+/// esvr.Volume: voxels and the other properties of their grid. It does not change after it was
+/// made.
 struct Volume {
   std::shared_ptr<const VolumeGrid> grid;
   std::uint64_t roundedValues = 0;  ///< active voxels whose number was rounded to a float
@@ -34,13 +40,13 @@ struct Grid {
   std::shared_ptr<const StoredGrid> grid;
 };
 
-using Corner = std::array<std::int32_t, 3>;
 /// The limit that a caller gives, or the usual one.
 [[nodiscard]] inline std::uint64_t memoryLimit(const std::optional<std::uint64_t>& given) {
   return given ? *given : usualMemoryLimit();
 }
 
 /// A box of voxels as Python has it: its first and its last voxel.
+using Corner = std::array<std::int32_t, 3>;
 using PlainBox = std::array<Corner, 2>;
 
 [[nodiscard]] inline Coord coordOf(const Corner& c) { return {c[0], c[1], c[2]}; }
@@ -51,21 +57,6 @@ using PlainBox = std::array<Corner, 2>;
   return PlainBox{{{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}}};
 }
 
-/// A part of the content of a file that is saved as VDB.
-struct SavedPart {
-  std::optional<PlainBox> box;
-  std::optional<std::size_t> layers, maxEllipsoids;
-
-  [[nodiscard]] bool isWhole() const { return !box && !layers && !maxEllipsoids; }
-};
-
-/// Writes the voxels of all grids of a file to a .vdb or .nvdb file.
-/// \return the names of the carried grids that were left out because they cannot be cut
-/// \throws UsageError  the box is empty, or a number is 0
-/// \throws BadInput  all grids would be left out
-std::vector<std::string> saveFile(const File& file, const std::filesystem::path& path,
-                                  const SavedPart& part, bool overwrite);
-
 /// The matrix from index to world coordinates, for column vectors; None for a frustum.
 [[nodiscard]] py::object matrixOf(const Transform& transform);
 
@@ -75,14 +66,51 @@ std::vector<std::string> saveFile(const File& file, const std::filesystem::path&
 [[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
                              const std::optional<std::uint64_t>& maxMemory = std::nullopt);
 
+/// Waits for a call on another thread with the GIL released. A signal that Python turns into an
+/// exception sets the token; the exception is thrown when the call has ended.
+template <class Result>
+Result waitFor(std::future<Result>& call, CancelToken& token) {
+  constexpr std::chrono::milliseconds kPoll{50};
+  std::optional<py::error_already_set> raised;
+  while (true) {
+    {
+      const py::gil_scoped_release release;
+      if (call.wait_for(kPoll) == std::future_status::ready) break;
+    }
+    if (raised || PyErr_CheckSignals() == 0) continue;
+    raised.emplace();
+    token.cancel();
+  }
+  if (raised) {
+    const py::gil_scoped_release release;
+    call.wait();
+  }
+  if (raised) throw std::move(*raised);
+  return call.get();
+}
+
+/// Runs a call that takes long on another thread. The loops of the library look at the token, so
+/// that the call ends soon after Ctrl-C.
+/// \param call  takes a CancelToken& or nothing; it must not use objects of Python
+template <class Call>
+auto interruptible(const Call& call) {
+  CancelToken token;
+  auto running = std::async(std::launch::async, [&] {
+    const CancelScope scope(&token);
+    if constexpr (std::is_invocable_v<Call, CancelToken&>)
+      return call(token);
+    else
+      return call();
+  });
+  return waitFor(running, token);
+}
+
 // Each adds its functions and classes to the module.
-void addErrors(py::module_& module);
 void addVolume(py::module_& module);
 void addPacked(py::module_& module);
 void addGrid(py::module_& module);
 void addFiles(py::module_& module);
 void addFit(py::module_& module);
 void addRender(py::module_& module);
-void addCompare(py::module_& module);
 
 }  // namespace esvr::python

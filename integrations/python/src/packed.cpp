@@ -15,7 +15,6 @@
 #include "esvr/grid_names.h"
 #include "esvr/packed_grid.h"
 #include "esvr/sequence_file.h"
-#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {

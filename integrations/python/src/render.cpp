@@ -10,7 +10,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "python/src/interruptible.h"
+#include "python/src/objects.h"
 
 namespace esvr::python {
 namespace {

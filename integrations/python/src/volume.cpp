@@ -9,7 +9,6 @@
 
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
-#include "python/src/interruptible.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
