@@ -7,13 +7,15 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_names.h"
-#include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::view {
-namespace {
 
 namespace fs = std::filesystem;
+
+// What files hold.
+
+namespace {
 
 ReadLimits limitsOf(const cli::HostMemory& memory) {
   ReadLimits limits{memory.maxBytes, memory.voxels};
@@ -120,6 +122,52 @@ std::optional<cli::FrameNumber> Collection::frameAt(const GridPlace& place) cons
   if (std::find(file.frames.begin(), file.frames.end(), *place.frame) == file.frames.end())
     throw BadInput(file.path.filename().string() + " has no frame " + std::to_string(*place.frame));
   return place.frame;
+}
+
+// Grids that are ready to be drawn.
+
+namespace {
+
+/// Enough for several clients with a reference each. A sequence that plays fills all places.
+constexpr std::size_t kMostKept = 8;
+
+}  // namespace
+
+Renderer& Drawable::renderer(bool shaded) {
+  auto& renderer = shaded ? shaded_ : plain_;
+  if (!renderer) {
+    render::DrawSettings settings = settings_;
+    settings.shaded = shaded;
+    renderer.emplace(scenes_, settings);
+  }
+  return **renderer;
+}
+
+std::shared_ptr<Drawable> Drawables::get(GridPlace place) {
+  place.frame = collection_.frameAt(place);
+  const auto found = std::find_if(kept_.begin(), kept_.end(),
+                                  [&](const Kept& kept) { return kept.place == place; });
+  if (found != kept_.end()) {
+    kept_.splice(kept_.begin(), kept_, found);
+    return found->drawable;
+  }
+  if (kept_.size() == kMostKept) kept_.pop_back();
+  auto scenes = scenesAt(place);
+  auto drawable = scenes ? std::make_shared<Drawable>(std::move(*scenes), settings_) : nullptr;
+  kept_.push_front({place, drawable});
+  return drawable;
+}
+
+std::optional<std::vector<render::Scene>> Drawables::scenesAt(const GridPlace& place) {
+  const render::SceneFile file{
+      collection_.fileAt(place).path, collection_.gridAt(place).name, {}, settings_.memory};
+  if (!place.frame) return readScenes(file);
+  return scenesOf(readerOf(place.file).read(*place.frame), file);
+}
+
+SequenceReader& Drawables::readerOf(std::size_t file) {
+  return readers_.try_emplace(file, collection_.files()[file].path, limitsOf(settings_.memory))
+      .first->second;
 }
 
 }  // namespace esvr::view

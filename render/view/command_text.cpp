@@ -5,13 +5,59 @@
 #include <charconv>
 #include <cmath>
 #include <initializer_list>
+#include <utility>
 
 #include "cli/shell_word.h"
-#include "render/render_options.h"
-#include "render/view/look_names.h"
 #include "render/view/painting.h"
 
 namespace esvr::view {
+
+// Names of transfer functions.
+
+namespace {
+
+/// Rounding of colors and places in clients.
+constexpr double kTolerance = 1e-9;
+
+bool near(double a, double b, double scale = 1.0) { return std::abs(a - b) <= kTolerance * scale; }
+
+bool sameColors(const ColorMap& a, const ColorMap& b, double extent) {
+  const auto same = [&](const ColorPoint& p, const ColorPoint& q) {
+    return near(p.x, q.x, extent) && near(p.color.r, q.color.r) && near(p.color.g, q.color.g) &&
+           near(p.color.b, q.color.b);
+  };
+  return a.space == b.space &&
+         std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), same);
+}
+
+bool sameCurve(const OpacityCurve& a, const OpacityCurve& b, double extent) {
+  const auto same = [&](const OpacityPoint& p, const OpacityPoint& q) {
+    return near(p.x, q.x, extent) && near(p.opacity, q.opacity) && near(p.midpoint, q.midpoint) &&
+           near(p.sharpness, q.sharpness);
+  };
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), same);
+}
+
+}  // namespace
+
+std::optional<LookNames> namesOf(const TransferFunction& f) {
+  // Options give the range as float.
+  const ValueRange range{float(f.opacity.front().x), float(f.opacity.back().x)};
+  const double extent = std::max({std::abs(f.opacity.front().x), std::abs(f.opacity.back().x)});
+  const auto over = [&](const ColorMap& map, const OpacityCurve& curve) {
+    return rescaled({map, curve}, range);
+  };
+  for (const std::string& colors : builtInColorMaps())
+    for (const std::string& opacity : builtInOpacities()) {
+      const TransferFunction known = over(builtInColorMap(colors), builtInOpacity(opacity));
+      if (sameColors(known.colors, f.colors, extent) && sameCurve(known.opacity, f.opacity, extent))
+        return LookNames{colors, opacity, range};
+    }
+  return std::nullopt;
+}
+
+// The words of a command.
+
 namespace {
 
 /// The shortest text that gives the number back.
@@ -99,8 +145,8 @@ void addRays(const SceneWish& scene, Words& to) {
   if (const auto& b = o.background) to.add("--background", listText({b->r, b->g, b->b}));
 }
 
-/// Adds the reference if the command can draw it: its grid must have the same name, and the files no
-/// frames.
+/// Adds the reference if the command can draw it: its grid must have the same name, and the files
+/// no frames.
 void addReference(const Collection& collection, const SceneWish& scene, Words& to) {
   if (!scene.compare) return;
   const GridPlace& other = scene.compare->with;

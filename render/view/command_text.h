@@ -5,9 +5,19 @@
 #include <string>
 
 #include "render/view/collection.h"
-#include "render/view/scene_json.h"
+#include "render/view/requests.h"
 
 namespace esvr::view {
+
+/// The built-in color map and opacity curve over a range of values.
+struct LookNames {
+  std::string colors, opacity;
+  ValueRange range;
+};
+
+/// Finds the options of esvr-render that give a transfer function.
+/// \return nothing if it is not made of a built-in map and a built-in curve over one range
+[[nodiscard]] std::optional<LookNames> namesOf(const TransferFunction& function);
 
 /// The file that the command reads the transfer function from.
 inline constexpr const char* kTransferFile = "transfer.json";

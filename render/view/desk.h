@@ -1,15 +1,32 @@
 #pragma once
-/// Takes the messages of clients: answers what needs no voxels, and passes the rest to the studio.
+/// Takes the messages of clients: answers what needs no voxels, and passes the rest to the studio
+/// as tasks.
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "esvr/sparse_volume.h"
 #include "render/view/collection.h"
 #include "render/view/outlet.h"
 #include "render/view/studio.h"
 
 namespace esvr::view {
+
+inline constexpr const char* kProgram = "esvr-view";
+
+inline constexpr std::size_t kHistogramBins = 256;
+
+/// The number of active voxels in each of kHistogramBins parts of a range of the same width. Values
+/// outside the range count in the first or last part. If the range has no extent, all count in the
+/// first one.
+[[nodiscard]] std::vector<std::uint64_t> histogramOf(const SparseVolume& volume, ValueRange range);
+
+/// The answer to "histogram".
+[[nodiscard]] std::string histogramMessage(const GridPlace& place, ValueRange range,
+                                           const std::vector<std::uint64_t>& counts);
 
 class Desk {
  public:

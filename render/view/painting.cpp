@@ -1,24 +1,13 @@
 #include "render/view/painting.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <utility>
 
-#include "render/render_options.h"
-#include "render/view/comparison_picture.h"
+#include "render/look.h"
 
 namespace esvr::view {
-namespace {
-
-RenderOptions withCancel(RenderOptions options, const CancelToken* cancel) {
-  options.cancel = cancel;
-  return options;
-}
-
-/// The reference is drawn like the grid.
-RenderOptions referenceOptions(const Painting::Input& input) {
-  return withCancel(renderOptionsOf(input.collection, input.scene, input.size), input.cancel);
-}
-
-}  // namespace
 
 RenderOptions renderOptionsOf(const Collection& collection, const SceneWish& scene,
                               Resolution size) {
@@ -27,13 +16,47 @@ RenderOptions renderOptionsOf(const Collection& collection, const SceneWish& sce
   return render::renderOptions(options, collection.gridAt(scene.place).outline);
 }
 
+namespace {
+
+constexpr std::size_t kChannels = 4;
+
+Image splitPicture(const Image& image, Image picture, double split) {
+  const std::size_t row = kChannels * std::size_t(image.width);
+  const std::size_t left = kChannels * std::size_t(std::lround(split * image.width));
+  for (std::size_t i = 0; i < image.rgba.size(); i += row)
+    std::copy_n(&image.rgba[i], left, &picture.rgba[i]);
+  return picture;
+}
+
+Image differencePicture(const Image& image, Image picture, double gain) {
+  for (std::size_t i = 0; i < picture.rgba.size(); ++i)
+    picture.rgba[i] = i % kChannels == kChannels - 1
+                          ? 1.0f
+                          : float(gain) * std::abs(picture.rgba[i] - image.rgba[i]);
+  return picture;
+}
+
+}  // namespace
+
+Image comparisonPicture(const Image& image, const Image& reference, const Comparison& comparison) {
+  switch (comparison.show) {
+    case CompareShow::kSplit:
+      return splitPicture(image, reference, comparison.split);
+    case CompareShow::kDifference:
+      return differencePicture(image, reference, comparison.gain);
+    case CompareShow::kReference:
+      break;
+  }
+  return reference;
+}
+
 Painting::Part::Part(const Input& input, const GridPlace& place, RenderOptions of)
     : drawable(input.drawables.get(place)), options(std::move(of)) {
+  options.cancel = input.cancel;
   if (drawable) {
     renderer = &drawable->renderer(options.shading.has_value());
     passes.emplace(*renderer, options);
   } else {
-    constexpr std::size_t kChannels = 4;
     whole = Image{input.size.width, input.size.height, {}};
     whole->rgba.resize(kChannels * std::size_t(whole->width) * std::size_t(whole->height));
   }
@@ -49,9 +72,9 @@ void Painting::Part::complete() {
 
 Painting::Painting(const Input& input)
     : comparison_(input.scene.compare),
-      own_(input, input.scene.place,
-           withCancel(renderOptionsOf(input.collection, input.scene, input.size), input.cancel)) {
-  if (comparison_) reference_.emplace(input, comparison_->with, referenceOptions(input));
+      own_(input, input.scene.place, renderOptionsOf(input.collection, input.scene, input.size)) {
+  // The reference is drawn like the grid.
+  if (comparison_) reference_.emplace(input, comparison_->with, own_.options);
 }
 
 void Painting::refine(double seconds) {

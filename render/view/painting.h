@@ -6,8 +6,8 @@
 
 #include "esvr/image_metrics.h"
 #include "esvr/progressive.h"
-#include "render/view/drawables.h"
-#include "render/view/scene_json.h"
+#include "render/view/collection.h"
+#include "render/view/requests.h"
 
 namespace esvr::view {
 
@@ -15,6 +15,12 @@ namespace esvr::view {
 /// \throws BadInput  the collection has no such grid
 [[nodiscard]] RenderOptions renderOptionsOf(const Collection& collection, const SceneWish& scene,
                                             Resolution size);
+
+/// The picture of a grid and its reference that a comparison asks for. Differences are those of
+/// each channel in front of black, and opaque.
+/// \param image, reference  of the same size
+[[nodiscard]] Image comparisonPicture(const Image& image, const Image& reference,
+                                      const Comparison& comparison);
 
 /// Draws a scene in passes from coarse to fine (esvr/progressive.h), with its reference if it has
 /// one.

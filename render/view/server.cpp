@@ -1,17 +1,368 @@
+// Connections, from the moment that they are accepted: each reads one request as an HttpSession,
+// and either gets an answer or becomes a SocketSession, over which messages come and pictures go.
+
 #include "render/view/server.h"
 
-#include <memory>
+#include <tbb/global_control.h>
+
+#include <array>
+#include <atomic>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/error.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/stream.hpp>
+#include <deque>
+#include <limits>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "esvr/error.h"
+#include "render/view/page.h"
 
 namespace esvr::view {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = beast::websocket;
+using asio::ip::tcp;
+using beast::error_code;
+
+// What exists at a time.
+
+/// A number of seats. They are taken and left on one thread.
+class Seats {
+ public:
+  explicit Seats(std::size_t count) : free_(std::make_shared<std::size_t>(count)) {}
+
+  /// A seat that is left when the last copy of the result is destroyed; null if there is none.
+  [[nodiscard]] std::shared_ptr<void> take() {
+    if (*free_ == 0) return nullptr;
+    --*free_;
+    return {free_.get(), [free = free_](void*) { ++*free; }};
+  }
+
+ private:
+  std::shared_ptr<std::size_t> free_;
+};
+
+/// The guests that are there at a time. A further one takes the place of the one that came first,
+/// so that guests who only wait keep nobody out.
+/// \tparam Guest  has isGuest(), and drop(), which ends it
+template <class Guest>
+class Guests {
+ public:
+  explicit Guests(std::size_t most) : most_(most) {}
+
+  void admit(const std::shared_ptr<Guest>& guest) {
+    std::erase_if(guests_, [](const std::weak_ptr<Guest>& g) {
+      const auto there = g.lock();
+      return !there || !there->isGuest();
+    });
+    if (guests_.size() >= most_ && !guests_.empty()) {
+      if (const auto first = guests_.front().lock()) first->drop();
+      guests_.pop_front();
+    }
+    guests_.push_back(guest);
+  }
+
+ private:
+  std::size_t most_;
+  std::deque<std::weak_ptr<Guest>> guests_;  ///< the one that came first is the first
+};
+
+// Sockets.
+
+/// What sockets work with. It outlives them.
+struct SocketContext {
+  Desk& desk;
+  Studio& studio;
+  ServerLimits limits;
+};
+
+/// The connection to a client that has opened a socket. All its work is on the thread of its stream, except for Outlet's functions. A client that does
+/// not read holds few answers and one picture, because its next message is read after its answers
+/// were sent, and because the studio passes over it.
+class SocketSession : public Outlet, public std::enable_shared_from_this<SocketSession> {
+ public:
+  SocketSession(beast::tcp_stream stream, const SocketContext& context, std::shared_ptr<void> seat);
+
+  /// Accepts the request, and serves the client until the connection ends.
+  void run(Request request);
+
+  void answer(std::string text) override { post({std::move(text), false}); }
+  void deliver(std::string bytes) override;
+  [[nodiscard]] bool busy() const override { return delivering_ > 0; }
+
+ private:
+  static constexpr std::size_t kMostAnswers = 4;  // that wait while a further message is read
+
+  struct Message {
+    std::string bytes;
+    bool isBinary = false;
+  };
+  void post(Message message);
+  void enqueue(Message message);
+  void read();
+  void onRead();
+  [[nodiscard]] bool take(std::string_view message);
+  void readLater();
+  void write();
+  void onWritten();
+  void close();
+
+  websocket::stream<beast::tcp_stream> socket_;
+  const SocketContext& context_;
+  const std::shared_ptr<void> seat_;
+  Request request_;
+  beast::flat_buffer buffer_;
+  asio::steady_timer timer_;
+  MessageRate rate_;
+  int wrongMessages_ = 0;
+  std::deque<Message> queue_;   ///< the first one is being written
+  bool readsWhenSent_ = false;  ///< the next message is read when the queue is short again
+  std::atomic<int> delivering_ = 0;
+};
+
+SocketSession::SocketSession(beast::tcp_stream stream, const SocketContext& context,
+                             std::shared_ptr<void> seat)
+    : socket_(std::move(stream)),
+      context_(context),
+      seat_(std::move(seat)),
+      timer_(socket_.get_executor()),
+      rate_(context.limits.messagesPerSecond, context.limits.messageBurst) {
+  beast::get_lowest_layer(socket_).expires_never();  // the socket has its own times
+  websocket::stream_base::timeout timeout{};
+  timeout.handshake_timeout = context.limits.requestTime;
+  timeout.idle_timeout = context.limits.idleTime;
+  timeout.keep_alive_pings = true;
+  socket_.set_option(timeout);
+  socket_.read_message_max(context.limits.messageBytes);
+  socket_.auto_fragment(false);  // a picture is one frame
+}
+
+void SocketSession::run(Request request) {
+  request_ = std::move(request);
+  socket_.async_accept(request_, [self = shared_from_this()](error_code error) {
+    if (!error) self->read();
+  });
+}
+
+void SocketSession::deliver(std::string bytes) {
+  ++delivering_;
+  post({std::move(bytes), true});
+}
+
+void SocketSession::post(Message message) {
+  asio::post(socket_.get_executor(),
+             [self = shared_from_this(), message = std::move(message)]() mutable {
+               self->enqueue(std::move(message));
+             });
+}
+
+void SocketSession::enqueue(Message message) {
+  if (!socket_.is_open()) return;
+  queue_.push_back(std::move(message));
+  if (queue_.size() == 1) write();
+}
+
+void SocketSession::read() {
+  socket_.async_read(buffer_, [self = shared_from_this()](error_code error, std::size_t) {
+    if (error)
+      self->close();
+    else
+      self->onRead();
+  });
+}
+
+void SocketSession::onRead() {
+  const auto data = buffer_.cdata();
+  const std::string_view text(static_cast<const char*>(data.data()), data.size());
+  if (!take(text)) ++wrongMessages_;
+  buffer_.consume(buffer_.size());
+  if (wrongMessages_ <= context_.limits.wrongMessages) return readLater();
+  socket_.async_close(websocket::close_code::policy_error,
+                      [self = shared_from_this()](error_code) { self->close(); });
+}
+
+/// \return false if the message was wrong
+bool SocketSession::take(std::string_view message) {
+  if (!socket_.got_binary()) return context_.desk.receive(shared_from_this(), message);
+  answer(failedMessage("messages must be text, and this one is binary"));
+  return false;
+}
+
+/// Reads the next message when the rate allows it and answers do not pile up.
+void SocketSession::readLater() {
+  timer_.expires_after(rate_.count(MessageRate::Clock::now()));
+  timer_.async_wait([self = shared_from_this()](error_code error) {
+    if (error) return;
+    if (self->queue_.size() <= kMostAnswers)
+      self->read();
+    else
+      self->readsWhenSent_ = true;
+  });
+}
+
+void SocketSession::write() {
+  socket_.binary(queue_.front().isBinary);
+  socket_.async_write(asio::buffer(queue_.front().bytes),
+                      [self = shared_from_this()](error_code error, std::size_t) {
+                        if (error)
+                          self->close();
+                        else
+                          self->onWritten();
+                      });
+}
+
+void SocketSession::onWritten() {
+  if (queue_.front().isBinary) --delivering_, context_.studio.wake();
+  queue_.pop_front();
+  if (!queue_.empty()) write();
+  if (readsWhenSent_ && queue_.size() <= kMostAnswers) readsWhenSent_ = false, read();
+}
+
+void SocketSession::close() {
+  context_.studio.leave(*this);
+  timer_.cancel();
+  error_code ignored;
+  beast::get_lowest_layer(socket_).socket().close(ignored);
+}
+
+// Requests.
+
+/// What connections work with. It outlives them.
+struct HttpContext {
+  Site site;
+  std::string_view page;
+  SocketContext socket;
+  Seats clients;
+  Seats requests;
+};
+
+/// Reads one request, and answers it or hands the connection to a SocketSession. It is a guest
+/// until its request has the token.
+class HttpSession : public std::enable_shared_from_this<HttpSession> {
+ public:
+  HttpSession(tcp::socket socket, HttpContext& context);
+  void run();
+
+  [[nodiscard]] bool isGuest() const { return !seat_; }
+  /// Closes the connection.
+  void drop();
+
+ private:
+  void onHead(error_code error);
+  void serve(const Request& request);
+  void openSocket(Request request);
+  void send(Response response);
+  void drain();
+
+  beast::tcp_stream stream_;
+  HttpContext& context_;
+  std::shared_ptr<void> seat_;  ///< null for a guest
+  beast::flat_buffer buffer_;
+  http::request_parser<http::empty_body> parser_;
+  Response response_;
+  std::array<char, 4096> rest_{};  ///< bytes that nobody reads
+};
+
+HttpSession::HttpSession(tcp::socket socket, HttpContext& context)
+    : stream_(std::move(socket)), context_(context), buffer_(context.socket.limits.headBytes) {
+  parser_.header_limit(std::uint32_t(context.socket.limits.headBytes));
+  // No body is read, and judge() refuses requests with one.
+  parser_.body_limit(std::numeric_limits<std::uint64_t>::max());
+}
+
+void HttpSession::run() {
+  stream_.expires_after(context_.socket.limits.guestTime);
+  http::async_read_header(
+      stream_, buffer_, parser_,
+      [self = shared_from_this()](error_code error, std::size_t) { self->onHead(error); });
+}
+
+void HttpSession::drop() {
+  error_code ignored;
+  stream_.socket().close(ignored);  // what waits for the connection ends with an error
+}
+
+void HttpSession::onHead(error_code error) {
+  if (!error) return serve(parser_.get());
+  if (error == http::error::header_limit || error == http::error::buffer_overflow)
+    return send(statusResponse(http::status::request_header_fields_too_large));
+  const bool isHttp =
+      error.category() == http::make_error_code(http::error::end_of_stream).category();
+  if (isHttp && error != http::error::end_of_stream && error != http::error::partial_message)
+    send(statusResponse(http::status::bad_request));
+}
+
+void HttpSession::serve(const Request& request) {
+  const Verdict verdict = judge(request, context_.site);
+  if (verdict.target == Target::kNothing) return send(statusResponse(verdict.status));
+  seat_ = context_.requests.take();
+  if (!seat_) return send(statusResponse(http::status::service_unavailable));
+  stream_.expires_after(context_.socket.limits.requestTime);
+  if (verdict.target == Target::kSocket) return openSocket(request);
+  const auto host = request[http::field::host];
+  send(pageResponse(context_.page, {host.data(), host.size()}));
+}
+
+void HttpSession::openSocket(Request request) {
+  auto seat = context_.clients.take();
+  if (!seat) return send(statusResponse(http::status::service_unavailable));
+  std::make_shared<SocketSession>(std::move(stream_), context_.socket, std::move(seat))
+      ->run(std::move(request));
+}
+
+void HttpSession::send(Response response) {
+  response_ = std::move(response);
+  http::async_write(stream_, response_, [self = shared_from_this()](error_code, std::size_t) {
+    error_code ignored;
+    self->stream_.socket().shutdown(tcp::socket::shutdown_send, ignored);
+    self->drain();
+  });
+}
+
+/// Reads until the client closes or its time is over. If a connection is closed before all was
+/// read, the client may lose the answer.
+void HttpSession::drain() {
+  stream_.async_read_some(asio::buffer(rest_),
+                          [self = shared_from_this()](error_code error, std::size_t) {
+                            if (!error) self->drain();
+                          });
+}
+
+// The server.
+
+/// Accepts connections. Its functions, and those of its connections, are called by the thread that runs the context.
+class Server {
+ public:
+  /// Listens.
+  /// \throws RuntimeFailure  the address cannot be used
+  Server(asio::io_context& io, const tcp::endpoint& at, HttpContext& context);
+
+  [[nodiscard]] tcp::endpoint endpoint() const { return endpoint_; }
+  /// Begins to accept connections.
+  void run();
+
+ private:
+  void runLater();
+
+  tcp::acceptor acceptor_;
+  asio::steady_timer pause_;
+  tcp::endpoint endpoint_;
+  HttpContext& context_;
+  Guests<HttpSession> guests_;
+};
+
 namespace {
 
-using boost::asio::ip::tcp;
-
-tcp::acceptor listeningAt(boost::asio::io_context& io, const tcp::endpoint& at) try {
+tcp::acceptor listeningAt(asio::io_context& io, const tcp::endpoint& at) try {
   return tcp::acceptor(io, at);
 } catch (const boost::system::system_error& error) {
   throw RuntimeFailure("cannot listen at " + at.address().to_string() + ", port " +
@@ -20,7 +371,7 @@ tcp::acceptor listeningAt(boost::asio::io_context& io, const tcp::endpoint& at) 
 
 }  // namespace
 
-Server::Server(boost::asio::io_context& io, const tcp::endpoint& at, HttpContext& context)
+Server::Server(asio::io_context& io, const tcp::endpoint& at, HttpContext& context)
     : acceptor_(listeningAt(io, at)),
       pause_(io),
       endpoint_(acceptor_.local_endpoint()),
@@ -28,9 +379,9 @@ Server::Server(boost::asio::io_context& io, const tcp::endpoint& at, HttpContext
       guests_(context.socket.limits.guests) {}
 
 void Server::run() {
-  acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
+  acceptor_.async_accept([this](error_code error, tcp::socket socket) {
     if (error) return runLater();
-    boost::system::error_code ignored;
+    error_code ignored;
     socket.set_option(tcp::no_delay(true), ignored);
     const auto session = std::make_shared<HttpSession>(std::move(socket), context_);
     guests_.admit(session);
@@ -43,9 +394,55 @@ void Server::run() {
 void Server::runLater() {
   constexpr std::chrono::milliseconds kPause{100};
   pause_.expires_after(kPause);
-  pause_.async_wait([this](boost::system::error_code error) {
+  pause_.async_wait([this](error_code error) {
     if (!error) run();
   });
+}
+
+// The service.
+
+namespace {
+
+std::string deviceText(const Device& device) {
+  if (device.kind != DeviceKind::kCpu) return deviceName(device);
+  using Control = tbb::global_control;
+  const std::size_t threads = Control::active_value(Control::max_allowed_parallelism);
+  return deviceName(device) + ", " + std::to_string(threads) + " thread" +
+         (threads == 1 ? "" : "s");
+}
+
+}  // namespace
+
+/// The part of a service that connections use and are made by.
+struct Service::Connections {
+  Connections(asio::io_context& io, Desk& desk, Studio& studio, const Settings& settings)
+      : context{settings.site,
+                viewPage(),
+                {desk, studio, settings.limits},
+                Seats(settings.limits.clients),
+                Seats(settings.limits.requests)},
+        server(io, settings.at, context) {
+    server.run();
+  }
+
+  HttpContext context;
+  Server server;
+};
+
+Service::Service(const Collection& collection, const Settings& settings)
+    : io_(1),
+      studio_(collection, settings.drawing),
+      desk_(collection, studio_, deviceText(settings.drawing.device)),
+      connections_(std::make_unique<Connections>(io_, desk_, studio_, settings)) {}
+
+// Connections may outlive this call in handlers of the context, but the studio no longer sends.
+Service::~Service() { studio_.stop(); }
+
+tcp::endpoint Service::endpoint() const { return connections_->server.endpoint(); }
+
+bool Service::endsWithin(std::chrono::milliseconds time) {
+  stop();
+  return studio_.endsWithin(time);
 }
 
 }  // namespace esvr::view

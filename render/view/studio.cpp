@@ -8,8 +8,6 @@
 #include "cli/stopwatch.h"
 #include "esvr/error.h"
 #include "esvr/memory_limit.h"
-#include "render/view/binary_message.h"
-#include "render/view/failed_message.h"
 #include "render/view/jpeg_file.h"
 
 namespace esvr::view {
@@ -21,8 +19,8 @@ constexpr double kFirstBudget = 0.03;
 constexpr std::size_t kMostTasks = 8;  // that wait for one client
 constexpr double kMs = 1e3;            // milliseconds of a second
 
-/// Memory of a picture while it is drawn and encoded: the last pass, the picture that it is enlarged to,
-/// its copy and the encoded bytes. A comparison has a second picture of each.
+/// Memory of a picture while it is drawn and encoded: the last pass, the picture that it is
+/// enlarged to, its copy and the encoded bytes. A comparison has a second picture of each.
 double bytesOf(const PictureRequest& picture) {
   constexpr double kBytesPerPixel = 64.0;
   const double pictures = picture.scene.compare ? 2.0 : 1.0;
@@ -253,8 +251,8 @@ void Studio::drawPass(Job& job, Outlet& outlet) {
   if (last) job.cancel.cancel();
 }
 
-/// Memory is needed for one picture that is being drawn, and for those that wait for their next pass. The
-/// picture of a pass is held together with its copy that is encoded.
+/// Memory is needed for one picture that is being drawn, and for those that wait for their next
+/// pass. The picture of a pass is held together with its copy that is encoded.
 void Studio::makeRoom(const PictureRequest& picture, const Job* own) {
   const double needed = bytesOf(picture);
   requireWithinMemory(needed, maxBytes_,

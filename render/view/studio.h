@@ -12,18 +12,18 @@
 #include <vector>
 
 #include "esvr/progress.h"
-#include "render/view/drawables.h"
+#include "render/view/collection.h"
 #include "render/view/outlet.h"
 #include "render/view/painting.h"
 #include "render/view/requests.h"
 
 namespace esvr::view {
 
-/// One thread draws, because a picture uses the whole device, and because renderers then need to keep
-/// decoded voxels only once. Clients take turns, pass by pass. The passes of clients that drag come
-/// first, then the first passes of other pictures, then tasks, and then refinements. A pass is given up
-/// and repeated later if a more urgent one of another client waits, because it may take long on a CPU.
-/// Tasks are not given up.
+/// One thread draws, because a picture uses the whole device, and because renderers then need to
+/// keep decoded voxels only once. Clients take turns, pass by pass. The passes of clients that drag
+/// come first, then the first passes of other pictures, then tasks, and then refinements. A pass is
+/// given up and repeated later if a more urgent one of another client waits, because it may take
+/// long on a CPU. Tasks are not given up.
 class Studio {
  public:
   /// A task that needs the grids. It gets the way to its client, and a token that is set when the
@@ -36,8 +36,8 @@ class Studio {
   Studio& operator=(const Studio&) = delete;
 
   /// Replaces the client's picture: a request that waits is forgotten, and a picture that is being
-  /// refined is cancelled. The picture of a client that drags is shown nevertheless, because a client
-  /// that sends requests faster than they are drawn would otherwise never see one.
+  /// refined is cancelled. The picture of a client that drags is shown nevertheless, because a
+  /// client that sends requests faster than they are drawn would otherwise never see one.
   void draw(const std::shared_ptr<Outlet>& client, DrawRequest request);
   /// \throws BadInput  the client has too many tasks that wait
   void add(const std::shared_ptr<Outlet>& client, Task task);
@@ -49,9 +49,9 @@ class Studio {
   void stop();
   /// Cancels everything. \return false if the thread goes on for longer than a time
   [[nodiscard]] bool endsWithin(std::chrono::milliseconds time);
-  /// Checks the memory of a picture that is about to be drawn, and gives up pictures of other clients
-  /// that wait for their next pass, so that all of them together keep to the limit. Those are drawn anew,
-  /// in one pass. To be called by tasks.
+  /// Checks the memory of a picture that is about to be drawn, and gives up pictures of other
+  /// clients that wait for their next pass, so that all of them together keep to the limit. Those
+  /// are drawn anew, in one pass. To be called by tasks.
   /// \throws MemoryExceeded  the picture alone is too large
   void makeRoomFor(const PictureRequest& picture) { makeRoom(picture, nullptr); }
 

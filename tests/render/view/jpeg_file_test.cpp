@@ -1,5 +1,5 @@
-// Plan: pictures are encoded and decoded by libjpeg. With the best quality, smooth pictures come back
-// within the rounding of JPEG's color transform and of its coefficients.
+// Plan: pictures are encoded and decoded by libjpeg. With the best quality, smooth pictures come
+// back within the rounding of JPEG's color transform and of its coefficients.
 
 #include "render/view/jpeg_file.h"
 

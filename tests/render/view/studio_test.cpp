@@ -1,21 +1,83 @@
-// Plan: clients that keep their messages ask for pictures. The picture of a "slow" request has so many
-// samples that its last pass takes longer than all that the other client does meanwhile.
+// Plan: clients that keep their messages ask for pictures. The picture of a "slow" request has so
+// many samples that its last pass takes longer than all that the other client does meanwhile.
 
 #include "render/view/studio.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <cstring>
+#include <functional>
 #include <future>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
-#include "render/view/kept_outlet.h"
-#include "render/view/view_files.h"
+#include "render/view/outlet.h"
+#include "render/view/view_client.h"
 
 namespace esvr::view {
 namespace {
 
 using nlohmann::json;
-using test::KeptOutlet;
+
+/// A client that keeps what it is sent.
+class KeptOutlet : public Outlet {
+ public:
+  void answer(std::string text) override { keep(json::parse(text)); }
+  void deliver(std::string bytes) override {
+    std::uint32_t length = 0;  // on the machines of the tests, in the order of the message
+    std::memcpy(&length, bytes.data(), sizeof length);
+    keep(json::parse(bytes.substr(sizeof length, length)));
+  }
+  [[nodiscard]] bool busy() const override {
+    const std::scoped_lock lock(mutex_);
+    return busy_;
+  }
+  void setBusy(bool busy) {
+    const std::scoped_lock lock(mutex_);
+    busy_ = busy;
+  }
+
+  /// The heads of all messages so far.
+  [[nodiscard]] std::vector<json> heads() const {
+    const std::scoped_lock lock(mutex_);
+    return heads_;
+  }
+  /// Waits until a message is as wanted. \return false if there is none in ten seconds
+  bool waitFor(const std::function<bool(const json&)>& wanted) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, std::chrono::seconds(10),
+                             [&] { return std::any_of(heads_.begin(), heads_.end(), wanted); });
+  }
+  bool waitForPicture(int id) {
+    return waitFor([id](const auto& h) { return h["type"] == "picture" && h["id"] == id; });
+  }
+  bool waitForLast(int id) {
+    return waitFor([id](const auto& h) {
+      return h["type"] == "picture" && h["id"] == id && h["last"] == true;
+    });
+  }
+
+ private:
+  void keep(json head) {
+    {
+      const std::scoped_lock lock(mutex_);
+      heads_.push_back(std::move(head));
+    }
+    changed_.notify_all();
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<json> heads_;
+  bool busy_ = false;
+};
 
 DrawRequest request(int id, bool moving = false) {
   DrawRequest r;

@@ -1,11 +1,14 @@
 #pragma once
-/// Clients of a server of the viewer on this machine.
+/// Clients of a server of the viewer on this machine, and files that it shows them.
 
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "support/temporary_folder.h"
 
 namespace esvr::test {
 
@@ -23,8 +26,8 @@ class RawClient {
   ~RawClient();
   /// \return whether all were sent
   bool send(const std::string& bytes);
-  /// Sends the same bytes again and again. \return false if the server stopped reading after `count`
-  /// times at most
+  /// Sends the same bytes again and again. \return false if the server stopped reading after
+  /// `count` times at most
   bool sendOften(const std::string& bytes, int count);
   /// All that the server sends until it closes the connection, or until `end` was received.
   /// \throws std::runtime_error  it does not close the connection in ten seconds
@@ -86,5 +89,18 @@ class ViewClient {
 
 /// A draw request of a small picture. \param more  further members of the scene
 [[nodiscard]] nlohmann::json drawMessage(int id, const nlohmann::json& more = {});
+
+/// A folder with a blob of ellipsoids, `blob.esvr`, whose grid is named "density"; with its voxels,
+/// `blob.vdb`; and with a sequence of two frames, `frames.esvr`, whose numbers are 7 and 9.
+class ViewFiles {
+ public:
+  ViewFiles();
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
+    return folder_ / name;
+  }
+
+ private:
+  TemporaryFolder folder_;
+};
 
 }  // namespace esvr::test

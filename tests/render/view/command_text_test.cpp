@@ -1,6 +1,6 @@
 // Plan: functions of built-in parts are found over any range; one changed point is noticed.
 
-#include "render/view/look_names.h"
+#include "render/view/command_text.h"
 
 #include <gtest/gtest.h>
 

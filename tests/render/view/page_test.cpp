@@ -1,13 +1,11 @@
 // Plan: a file is put into a small page and into the bundle, and taken out again by hand.
 
-#include "render/view/exported_page.h"
+#include "render/view/page.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
-
-#include "render/view/page.h"
 
 namespace esvr::view {
 namespace {

@@ -1,6 +1,6 @@
 // Plan: two pictures of a few pixels, and results by hand.
 
-#include "render/view/comparison_picture.h"
+#include "render/view/painting.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

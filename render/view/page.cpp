@@ -1,4 +1,4 @@
-#include "render/view/exported_page.h"
+#include "render/view/page.h"
 
 #include <fstream>
 #include <iterator>
@@ -10,7 +10,6 @@
 #include "cli/sequence.h"
 #include "esvr/error.h"
 #include "render/view/collection.h"
-#include "render/view/page.h"
 #include "report/base64.h"
 #include "report/escape.h"
 

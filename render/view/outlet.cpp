@@ -1,6 +1,5 @@
-#include "render/view/binary_message.h"
+#include "render/view/outlet.h"
 
-#include <cstdint>
 #include <nlohmann/json.hpp>
 
 namespace esvr::view {
@@ -15,6 +14,12 @@ std::string binaryMessage(const nlohmann::json& head, std::string_view bytes) {
   message.reserve(sizeof(std::uint32_t) + text.size() + bytes.size());
   for (unsigned shift = 0; shift < 32; shift += 8) message += char((text.size() >> shift) & 0xffu);
   return message.append(text).append(bytes);
+}
+
+std::string failedMessage(const std::string& text, std::optional<std::int64_t> id) {
+  nlohmann::json content{{"type", "failed"}, {"text", text}};
+  if (id) content["id"] = *id;
+  return textOf(content);
 }
 
 }  // namespace esvr::view
