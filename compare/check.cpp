@@ -11,23 +11,18 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "cli/byte_size.h"
-#include "cli/choice.h"
-#include "cli/command_line.h"
-#include "cli/frame_messages.h"
-#include "cli/interrupts.h"
-#include "cli/json_file.h"
-#include "cli/number.h"
-#include "cli/output.h"
-#include "cli/printable.h"
-#include "cli/sequence.h"
-#include "cli/table.h"
-#include "cli/thread_limit.h"
 #include "compare/compare_files.h"
 #include "compare/grid_file.h"
 #include "compare/judge.h"
 #include "compare/options.h"
 #include "esvr/error.h"
+#include "programs/command_line.h"
+#include "programs/files.h"
+#include "programs/messages.h"
+#include "programs/option_values.h"
+#include "programs/run_main.h"
+#include "programs/sequence.h"
+#include "programs/workers.h"
 
 namespace esvr::compare {
 

@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/error_bound.h"
-#include "cli/frame_range.h"
-#include "cli/host_memory.h"
-#include "cli/log.h"
 #include "compare/figures.h"
-#include "esvr/coord.h"
 #include "esvr/metrics.h"
+#include "esvr/volume.h"
+#include "programs/frames.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
+#include "programs/option_values.h"
 
 namespace esvr::compare {
 

@@ -10,15 +10,13 @@
 #include <span>
 #include <utility>
 
-#include "cli/names.h"
-#include "cli/table.h"
 #include "compare/judge.h"
 #include "esvr/error.h"
-#include "esvr/grid_descriptor.h"
-#include "esvr/inactive_values.h"
-#include "esvr/mesh_distance.h"
-#include "esvr/temporal_metrics.h"
-#include "esvr/vector_metrics.h"
+#include "esvr/grid.h"
+#include "esvr/metrics.h"
+#include "esvr/vdb_io.h"
+#include "programs/messages.h"
+#include "programs/names.h"
 
 namespace esvr::compare {
 

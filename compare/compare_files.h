@@ -7,8 +7,8 @@
 
 #include "compare/check.h"
 #include "compare/grid_file.h"
-#include "esvr/progress.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/device.h"
+#include "esvr/volume.h"
 
 namespace esvr::compare {
 

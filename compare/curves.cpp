@@ -14,23 +14,19 @@
 #include <utility>
 #include <vector>
 
-#include "cli/byte_size.h"
-#include "cli/bytes_file.h"
-#include "cli/command_line.h"
-#include "cli/interrupts.h"
-#include "cli/json_file.h"
-#include "cli/output.h"
-#include "cli/thread_limit.h"
 #include "compare/finding.h"
 #include "compare/options.h"
 #include "compare/report_parts.h"
 #include "compare/rows.h"
 #include "esvr/error.h"
-#include "report/chart.h"
-#include "report/data_table.h"
-#include "report/html_page.h"
-#include "report/html_table.h"
-#include "report/units.h"
+#include "programs/command_line.h"
+#include "programs/data_table.h"
+#include "programs/files.h"
+#include "programs/option_values.h"
+#include "programs/page.h"
+#include "programs/page_figures.h"
+#include "programs/run_main.h"
+#include "programs/workers.h"
 
 namespace esvr::compare {
 

@@ -14,13 +14,12 @@
 #include <limits>
 #include <utility>
 
-#include "cli/byte_size.h"
-#include "cli/number.h"
-#include "cli/shell_word.h"
-#include "cli/stopwatch.h"
 #include "compare/grid_file.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
+#include "programs/messages.h"
+#include "programs/option_values.h"
+#include "programs/run_main.h"
 
 namespace esvr::compare {
 

@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/host_memory.h"
 #include "esvr/baseline.h"
-#include "esvr/coord.h"
-#include "esvr/progress.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/device.h"
+#include "esvr/volume.h"
+#include "programs/memory.h"
 
 namespace esvr::compare {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "cli/table.h"
+#include "programs/messages.h"
 
 namespace esvr::compare {
 namespace {

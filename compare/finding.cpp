@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "report/units.h"
+#include "programs/data_table.h"
 
 namespace esvr::compare {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "compare/table_record.h"
-#include "report/emphasis.h"
+#include "programs/page_figures.h"
 
 namespace esvr::compare {
 

@@ -6,17 +6,16 @@
 #include <sstream>
 #include <utility>
 
-#include "cli/bytes_file.h"
-#include "cli/number.h"
-#include "cli/shell_word.h"
-#include "cli/stopwatch.h"
 #include "compare/external.h"
 #include "esvr/error.h"
-#include "esvr/flip.h"
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"
-#include "report/error_colors.h"
-#include "report/png_image.h"
+#include "programs/files.h"
+#include "programs/messages.h"
+#include "programs/option_values.h"
+#include "programs/page_figures.h"
+#include "programs/pictures.h"
+#include "programs/run_main.h"
 
 namespace esvr::compare {
 

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "compare/table_record.h"
+#include "esvr/device.h"
 #include "esvr/image.h"
-#include "esvr/progress.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::compare {

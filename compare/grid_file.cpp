@@ -2,10 +2,10 @@
 
 #include <utility>
 
-#include "cli/names.h"
-#include "cli/sequence.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "programs/names.h"
+#include "programs/sequence.h"
 
 namespace esvr::compare {
 

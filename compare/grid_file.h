@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/frame_pattern.h"
-#include "cli/host_memory.h"
-#include "cli/input_files.h"
 #include "esvr/container.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
+#include "programs/files.h"
+#include "programs/frames.h"
+#include "programs/memory.h"
 
 namespace esvr::compare {
 

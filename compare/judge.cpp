@@ -5,10 +5,9 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "cli/input_files.h"
-#include "cli/json_file.h"
-#include "cli/table.h"
 #include "esvr/error.h"
+#include "programs/files.h"
+#include "programs/messages.h"
 
 namespace esvr::compare {
 

@@ -3,12 +3,12 @@
 #include <string>
 #include <string_view>
 
-#include "cli/command_line.h"
-#include "cli/run_main.h"
 #include "compare/check.h"
 #include "compare/curves.h"
 #include "compare/options.h"
 #include "compare/table.h"
+#include "programs/command_line.h"
+#include "programs/run_main.h"
 
 namespace {
 

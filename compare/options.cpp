@@ -4,12 +4,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "cli/box_option.h"
-#include "cli/json_file.h"
-#include "cli/output.h"
-#include "cli/version_json.h"
-#include "cli/version_text.h"
 #include "esvr/baseline.h"
+#include "programs/files.h"
+#include "programs/help_text.h"
+#include "programs/option_values.h"
 
 namespace esvr::compare {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/command_line.h"
-#include "esvr/coord.h"
+#include "esvr/volume.h"
+#include "programs/command_line.h"
 
 namespace esvr::compare {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cli/table.h"
 #include "compare/figures.h"
-#include "report/html_page.h"
-#include "report/html_table.h"
-#include "report/units.h"
+#include "programs/data_table.h"
+#include "programs/messages.h"
+#include "programs/page.h"
+#include "programs/page_figures.h"
 
 namespace esvr::compare {
 

@@ -8,9 +8,9 @@
 
 #include "compare/finding.h"
 #include "compare/table_record.h"
-#include "report/chart.h"
-#include "report/data_table.h"
-#include "report/html.h"
+#include "programs/data_table.h"
+#include "programs/page.h"
+#include "programs/page_figures.h"
 
 namespace esvr::compare {
 

@@ -6,18 +6,16 @@
 #include <system_error>
 #include <utility>
 
-#include "cli/host_memory.h"
-#include "cli/memory.h"
-#include "cli/names.h"
-#include "cli/shell_word.h"
-#include "cli/stopwatch.h"
-#include "cli/table.h"
 #include "compare/options.h"
 #include "esvr/compact.h"
 #include "esvr/error.h"
 #include "esvr/fit.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
+#include "programs/names.h"
+#include "programs/run_main.h"
 
 namespace esvr::compare {
 

@@ -8,16 +8,14 @@
 #include <set>
 #include <utility>
 
-#include "cli/byte_size.h"
-#include "cli/command_line.h"
-#include "cli/device_option.h"
-#include "cli/interrupts.h"
-#include "cli/json_file.h"
-#include "cli/number.h"
-#include "cli/thread_limit.h"
 #include "compare/rows.h"
 #include "compare/table_report.h"
 #include "esvr/error.h"
+#include "programs/command_line.h"
+#include "programs/files.h"
+#include "programs/option_values.h"
+#include "programs/run_main.h"
+#include "programs/workers.h"
 
 namespace esvr::compare {
 

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/host_memory.h"
-#include "cli/log.h"
 #include "compare/external.h"
 #include "compare/gallery.h"
 #include "compare/options.h"
 #include "esvr/baseline.h"
-#include "esvr/coord.h"
+#include "esvr/volume.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
 
 namespace esvr::compare {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
+#include "esvr/volume.h"
 
 namespace esvr::compare {
 

@@ -8,19 +8,14 @@
 #include <ostream>
 #include <span>
 
-#include "cli/bytes_file.h"
-#include "cli/json_file.h"
-#include "cli/printable.h"
-#include "cli/table.h"
 #include "compare/finding.h"
 #include "compare/options.h"
 #include "compare/report_parts.h"
-#include "report/chart.h"
-#include "report/data_table.h"
-#include "report/html_page.h"
-#include "report/html_pictures.h"
-#include "report/html_table.h"
-#include "report/units.h"
+#include "programs/data_table.h"
+#include "programs/files.h"
+#include "programs/messages.h"
+#include "programs/page.h"
+#include "programs/page_figures.h"
 
 namespace esvr::compare {
 

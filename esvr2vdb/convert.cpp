@@ -16,14 +16,12 @@
 #include <variant>
 #include <vector>
 
+#include "esvr/compact.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
-#include "esvr/level_of_detail.h"
+#include "esvr/grid.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
-#include "esvr/vector_grid.h"
-#include "esvr/vector_metrics.h"
 #include "programs/files.h"
 #include "programs/messages.h"
 #include "programs/names.h"

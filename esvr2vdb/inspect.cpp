@@ -11,7 +11,7 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
 #include "programs/messages.h"

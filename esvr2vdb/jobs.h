@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "esvr/container.h"
-#include "esvr/coord.h"
+#include "esvr/device.h"
 #include "esvr/grid_coding.h"
-#include "esvr/progress.h"
 #include "esvr/vdb_io.h"
+#include "esvr/volume.h"
 #include "programs/memory.h"
 #include "programs/messages.h"
 #include "programs/sequence.h"

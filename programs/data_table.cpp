@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "programs/messages.h"
 
 namespace esvr::report {

@@ -21,13 +21,11 @@
 #include <utility>
 
 #include "core/atomic_file.h"
-#include "core/byte_text.h"
-#include "core/publish_file.h"
+#include "core/memory_budget.h"
 #include "core/read_input.h"
-#include "core/temporary_files.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
-#include "esvr/progress.h"
+#include "esvr/grid.h"
 
 namespace esvr::cli {
 

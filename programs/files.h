@@ -92,7 +92,7 @@ struct JsonFile {
 };
 
 /// JSON that may be printed to a terminal: if a text in it could control the terminal (shownText in
-/// esvr/grid_names.h), all characters beyond ASCII are escaped. Bytes that are not UTF-8 are replaced.
+/// esvr/grid.h), all characters beyond ASCII are escaped. Bytes that are not UTF-8 are replaced.
 /// \param indent  columns of a level; -1: everything is in one line
 [[nodiscard]] std::string jsonText(const nlohmann::ordered_json& json, int indent);
 

@@ -8,8 +8,8 @@
 #include <mutex>
 #include <optional>
 
-#include "esvr/memory_limit.h"
-#include "esvr/voxel_memory.h"
+#include "esvr/device.h"
+#include "esvr/volume.h"
 #include "programs/command_line.h"
 
 namespace esvr::cli {

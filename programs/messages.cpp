@@ -8,7 +8,7 @@
 #include <ostream>
 #include <utility>
 
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr::cli {
 

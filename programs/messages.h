@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/coord.h"
-#include "esvr/grid_descriptor.h"
+#include "esvr/grid.h"
+#include "esvr/volume.h"
 
 namespace esvr::cli {
 
 /// A text without what could control the terminal or pretend to be another line of the program, such as
-/// the name of a grid or a file (shownText in esvr/grid_names.h).
+/// the name of a grid or a file (shownText in esvr/grid.h).
 [[nodiscard]] std::string printable(const std::string& text);
 
 /// The same for a message of the program, which may have several lines. Names in it were made safe

@@ -9,9 +9,8 @@
 #include <vector>
 
 #include "esvr/container.h"
-#include "esvr/grid_descriptor.h"
-#include "esvr/grid_names.h"
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::cli {

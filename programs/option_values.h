@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/parse_text.h"
-#include "esvr/coord.h"
 #include "esvr/error.h"
+#include "esvr/volume.h"
 
 namespace esvr::cli {
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr::report {
 

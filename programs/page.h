@@ -11,7 +11,7 @@ namespace esvr::report {
 /// Base64 (RFC 4648), for pictures within a page.
 [[nodiscard]] std::string base64(std::string_view bytes);
 
-/// Text of unknown origin for HTML and XML: markup characters become entities, and it is replaced what shownText() (esvr/grid_names.h)
+/// Text of unknown origin for HTML and XML: markup characters become entities, and it is replaced what shownText() (esvr/grid.h)
 /// replaces, but for line feeds.
 [[nodiscard]] std::string escaped(std::string_view text);
 

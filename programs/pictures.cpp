@@ -13,7 +13,7 @@
 #include <string>
 
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr::report {
 namespace {

@@ -17,7 +17,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "core/publish_file.h"
+#include "core/atomic_file.h"
 #include "esvr/error.h"
 #include "programs/messages.h"
 

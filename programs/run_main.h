@@ -8,8 +8,8 @@
 #include <string>
 #include <thread>
 
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
 
 namespace esvr::cli {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/atomic_file.h"
+#include "esvr/device.h"
 #include "esvr/image.h"
-#include "esvr/progress.h"
 
 namespace esvr::report {
 

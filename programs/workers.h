@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "esvr/progress.h"
+#include "esvr/device.h"
 #include "programs/sequence.h"
 
 namespace esvr::cli {

@@ -7,9 +7,9 @@
 #include <numeric>
 #include <vector>
 
-#include "cli/stopwatch.h"
-#include "cli/table.h"
 #include "esvr/image_metrics.h"
+#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::render {
 

@@ -4,8 +4,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "cli/log.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
+#include "programs/messages.h"
 
 namespace esvr::render {
 

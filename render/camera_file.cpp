@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "cli/input_files.h"
 #include "esvr/error.h"
+#include "programs/files.h"
 
 namespace esvr::render {
 namespace {

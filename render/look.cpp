@@ -2,10 +2,9 @@
 
 #include <algorithm>
 
-#include "cli/number.h"
-#include "cli/number_list.h"
 #include "esvr/error.h"
-#include "report/video_file.h"
+#include "programs/option_values.h"
+#include "programs/video_file.h"
 
 namespace esvr::render {
 

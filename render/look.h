@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "programs/pictures.h"
 #include "render/options.h"
 #include "render/scene.h"
-#include "report/color_bar.h"
 
 namespace esvr::render {
 

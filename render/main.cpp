@@ -11,27 +11,23 @@
 #include <system_error>
 #include <vector>
 
-#include "cli/bytes_file.h"
-#include "cli/frame_pattern.h"
-#include "cli/interrupts.h"
-#include "cli/json_file.h"
-#include "cli/output.h"
-#include "cli/run_main.h"
-#include "cli/stopwatch.h"
-#include "cli/table.h"
-#include "cli/thread_limit.h"
-#include "cli/version_text.h"
+#include "esvr/device.h"
 #include "esvr/image_metrics.h"
-#include "esvr/memory_limit.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
+#include "programs/files.h"
+#include "programs/frames.h"
+#include "programs/help_text.h"
+#include "programs/messages.h"
+#include "programs/run_main.h"
+#include "programs/video_file.h"
+#include "programs/workers.h"
 #include "render/bench.h"
 #include "render/exr_file.h"
 #include "render/look.h"
 #include "render/options.h"
 #include "render/png_file.h"
 #include "render/scene.h"
-#include "report/video_file.h"
 
 namespace esvr::render {
 

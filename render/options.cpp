@@ -7,19 +7,15 @@
 #include <charconv>
 #include <iterator>
 
-#include "cli/byte_size.h"
-#include "cli/choice.h"
-#include "cli/command_line.h"
-#include "cli/device_option.h"
-#include "cli/frame_messages.h"
-#include "cli/host_memory.h"
-#include "cli/number_list.h"
-#include "cli/sequence.h"
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
+#include "programs/command_line.h"
+#include "programs/memory.h"
+#include "programs/option_values.h"
+#include "programs/sequence.h"
+#include "programs/video_file.h"
 #include "render/camera_file.h"
 #include "render/look.h"
-#include "report/video_file.h"
 
 namespace esvr::render {
 

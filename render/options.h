@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "cli/frame_pattern.h"
-#include "cli/host_memory.h"
-#include "cli/log.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
+#include "programs/frames.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
 #include "render/scene.h"
 
 namespace esvr::render {

@@ -4,8 +4,8 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::render {

@@ -8,10 +8,10 @@
 #include <variant>
 #include <vector>
 
-#include "cli/host_memory.h"
+#include "esvr/device.h"
 #include "esvr/grid_coding.h"
-#include "esvr/memory_limit.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
+#include "programs/memory.h"
 
 namespace esvr::render {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::vdb2esvr {

@@ -7,7 +7,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/vector_metrics.h"
+#include "esvr/metrics.h"
 #include "programs/messages.h"
 #include "programs/run_main.h"
 

@@ -10,9 +10,7 @@
 
 #include "esvr/convert.h"
 #include "esvr/error.h"
-#include "esvr/mesh_distance.h"
 #include "esvr/metrics.h"
-#include "esvr/sign_errors.h"
 #include "esvr/vdb_io.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/twins.h"

@@ -10,7 +10,7 @@
 #include <variant>
 
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "programs/command_line.h"
 #include "programs/memory.h"
 #include "programs/messages.h"

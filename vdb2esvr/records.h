@@ -10,8 +10,8 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
-#include "esvr/vector_metrics.h"
 #include "programs/sequence.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/convert.h"

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "esvr/coord.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
+#include "esvr/volume.h"
 #include "programs/files.h"
 #include "programs/help_text.h"
 #include "programs/memory.h"

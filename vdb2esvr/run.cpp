@@ -14,11 +14,8 @@
 #include <vector>
 
 #include "esvr/device.h"
-#include "esvr/device_workers.h"
 #include "esvr/error.h"
-#include "esvr/part_store.h"
-#include "esvr/rank_workers.h"
-#include "esvr/ranks.h"
+#include "esvr/workers.h"
 #include "programs/files.h"
 #include "programs/help_text.h"
 #include "programs/messages.h"

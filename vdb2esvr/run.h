@@ -4,8 +4,8 @@
 #include <functional>
 
 #include "esvr/container.h"
-#include "esvr/progress.h"
-#include "esvr/ranks.h"
+#include "esvr/device.h"
+#include "esvr/workers.h"
 #include "programs/messages.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/records.h"

@@ -15,11 +15,10 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "esvr/device.h"
-#include "esvr/frame_coding.h"
-#include "esvr/progress.h"
+#include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
+#include "esvr/volume.h"
 #include "programs/files.h"
 #include "programs/memory.h"
 #include "programs/messages.h"

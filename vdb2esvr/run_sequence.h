@@ -1,7 +1,7 @@
 #pragma once
 /// Converts a sequence of files, one for each frame.
 
-#include "esvr/ranks.h"
+#include "esvr/workers.h"
 #include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {

@@ -4,8 +4,8 @@
 #include <utility>
 #include <variant>
 
+#include "esvr/convert.h"
 #include "esvr/error.h"
-#include "esvr/voxel_reference.h"
 #include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {

@@ -6,8 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "esvr/grid_descriptor.h"
-#include "esvr/inactive_values.h"
+#include "esvr/grid.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/options.h"
 

@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "capi/objects.h"
-#include "core/cell_corner.h"
+#include "core/geometry.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/field.h"

@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "codec/range_coder.h"
-#include "core/axes.h"
 #include "core/brick_index.h"
-#include "esvr/coord.h"
+#include "core/geometry.h"
 #include "esvr/error.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

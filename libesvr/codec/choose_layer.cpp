@@ -14,7 +14,7 @@
 #include "codec/voxel_values.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 namespace esvr {
 

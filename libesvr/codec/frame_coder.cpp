@@ -18,7 +18,7 @@
 #include "codec/least_squares.h"
 #include "codec/voxel_coder.h"
 #include "codec/voxel_values.h"
-#include "core/axes.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 

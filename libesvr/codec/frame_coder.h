@@ -10,8 +10,8 @@
 
 #include "codec/past_voxels.h"
 #include "codec/range_coder.h"
-#include "esvr/coord.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
+#include "esvr/volume.h"
 
 namespace esvr::codec {
 

@@ -10,8 +10,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "core/rotation.h"
 #include "esvr/quantised.h"
 
 namespace esvr {

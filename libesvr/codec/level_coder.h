@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "codec/range_coder.h"
-#include "esvr/block_levels.h"
-#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 
 namespace esvr::codec {
 

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "core/brick_index.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 namespace esvr::codec {
 

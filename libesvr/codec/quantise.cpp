@@ -14,8 +14,8 @@
 
 #include "codec/brick_coder.h"
 #include "codec/lattice.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "core/rotation.h"
 #include "esvr/error.h"
 #include "esvr/quantised.h"
 

@@ -3,7 +3,7 @@
 // voxels has a price by how much its values matter, and is made if it saves more bits. The price falls until hardly
 // more of the overlap may be given up.
 
-#include "esvr/simplified_mask.h"
+#include "esvr/quantised.h"
 
 #include <tbb/task_arena.h>
 
@@ -17,8 +17,8 @@
 #include <limits>
 #include <optional>
 
-#include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 
 namespace esvr {

@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "codec/brick_coder.h"
-#include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 

@@ -14,7 +14,7 @@
 
 #include "codec/range_coder.h"
 #include "core/brick_index.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 namespace esvr::codec {
 

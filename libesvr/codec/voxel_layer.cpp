@@ -1,6 +1,6 @@
 // The values that the codes of a voxel layer stand for, and the volume that a layer holds.
 
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 #include <algorithm>
 #include <bit>

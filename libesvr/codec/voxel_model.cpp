@@ -8,8 +8,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 
 namespace esvr::codec {

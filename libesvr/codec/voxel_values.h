@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 namespace esvr::codec {
 

@@ -7,8 +7,8 @@
 #include "compact/choose_steps.h"
 #include "compact/measure_layers.h"
 #include "esvr/error.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
 
 namespace esvr {

@@ -1,4 +1,4 @@
-#include "esvr/level_of_detail.h"
+#include "esvr/compact.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 #include "compact/measure_layers.h"
 
+#include "esvr/compact.h"
 #include "esvr/grid_coding.h"
-#include "esvr/level_of_detail.h"
 #include "esvr/metrics.h"
 
 namespace esvr {

@@ -5,7 +5,7 @@
 
 #include "esvr/container.h"
 #include "esvr/metrics.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

@@ -1,4 +1,4 @@
-#include "esvr/residual.h"
+#include "esvr/compact.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 #include "core/parallel.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "field/evaluate_plan.h"
+#include "field/evaluate.h"
 
 namespace esvr {
 namespace {

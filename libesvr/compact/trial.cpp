@@ -6,8 +6,8 @@
 
 #include "core/parallel.h"
 #include "esvr/metrics.h"
+#include "format/ellipsoid_sections.h"
 #include "format/grid_rule.h"
-#include "format/layered_section.h"
 
 namespace esvr {
 namespace {

@@ -10,7 +10,7 @@
 #include "esvr/container.h"
 #include "esvr/device.h"
 #include "esvr/quantised.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "fit/intensity_problem.h"
 
 namespace esvr {

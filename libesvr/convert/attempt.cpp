@@ -9,8 +9,7 @@
 #include "core/add_seconds.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "format/level_section.h"
-#include "format/mask_section.h"
+#include "format/activity_sections.h"
 
 namespace esvr::convert {
 namespace {

@@ -12,7 +12,7 @@
 #include "convert/unless_cancelled.h"
 #include "core/add_seconds.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr::convert {
 namespace {

@@ -6,11 +6,11 @@
 #include <set>
 #include <vector>
 
-#include "codec/brick_order.h"
+#include "codec/brick_coder.h"
 #include "codec/voxel_values.h"
 #include "core/parallel.h"
-#include "esvr/voxel_reference.h"
-#include "format/related_voxels.h"
+#include "esvr/convert.h"
+#include "format/predicted_sections.h"
 
 namespace esvr {
 namespace {

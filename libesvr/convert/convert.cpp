@@ -15,11 +15,10 @@
 #include "convert/summable.h"
 #include "convert/unless_cancelled.h"
 #include "esvr/error.h"
-#include "esvr/frame_coding.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 #include "esvr/metrics.h"
-#include "format/mask_section.h"
+#include "format/activity_sections.h"
 
 namespace esvr {
 namespace {

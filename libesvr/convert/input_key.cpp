@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "esvr/convert.h"
-#include "format/byte_writer.h"
+#include "format/bytes.h"
 
 namespace esvr {
 namespace {

@@ -7,11 +7,11 @@
 
 #include "convert/exact_voxels.h"
 #include "convert/unless_cancelled.h"
-#include "esvr/empty_signs.h"
+#include "esvr/compact.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
-#include "esvr/residual.h"
-#include "esvr/sign_errors.h"
+#include "esvr/grid.h"
+#include "esvr/metrics.h"
+#include "esvr/volume.h"
 
 namespace esvr::convert {
 namespace {

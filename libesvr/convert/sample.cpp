@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "codec/brick_order.h"
+#include "codec/brick_coder.h"
 
 namespace esvr::convert {
 namespace {

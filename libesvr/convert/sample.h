@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr::convert {
 

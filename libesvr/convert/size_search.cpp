@@ -6,7 +6,7 @@
 
 #include "convert/unless_cancelled.h"
 #include "esvr/grid_coding.h"
-#include "format/layout.h"
+#include "format/section_table.h"
 
 namespace esvr::convert {
 namespace {

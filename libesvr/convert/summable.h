@@ -3,8 +3,7 @@
 
 #include <optional>
 
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr::convert {
 

@@ -11,7 +11,6 @@
 #include "convert/octave_search.h"
 #include "convert/unless_cancelled.h"
 #include "core/parallel.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 
 namespace esvr::convert {

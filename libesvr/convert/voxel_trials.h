@@ -7,7 +7,7 @@
 
 #include "convert/voxel_search.h"
 #include "core/add_seconds.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 namespace esvr::convert {
 

@@ -15,8 +15,8 @@
 #include <system_error>
 #include <utility>
 
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
 
 namespace esvr {
 namespace {

@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

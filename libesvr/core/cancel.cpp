@@ -1,5 +1,5 @@
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
 
 namespace esvr {
 namespace {

@@ -1,7 +1,7 @@
 /// The signs of the empty space of a level set: its regions, as gaps between bricks along lines, and the
 /// votes of the voxels around them.
 
-#include "esvr/empty_signs.h"
+#include "esvr/volume.h"
 
 #include <algorithm>
 #include <array>

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "esvr/coord.h"
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

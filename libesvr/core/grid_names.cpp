@@ -1,4 +1,4 @@
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 #include <algorithm>
 #include <charconv>

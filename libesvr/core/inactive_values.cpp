@@ -1,4 +1,4 @@
-#include "esvr/inactive_values.h"
+#include "esvr/grid.h"
 
 #include <algorithm>
 #include <bit>

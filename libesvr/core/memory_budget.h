@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "esvr/memory_limit.h"
-#include "esvr/voxel_memory.h"
+#include "esvr/device.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

@@ -1,4 +1,4 @@
-#include "esvr/memory_limit.h"
+#include "esvr/device.h"
 
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-#include "esvr/packed_grid.h"
+#include "esvr/grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <numeric>
 
 #include "core/parallel.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/memory_limit.h"
 
 namespace esvr {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-/// Loops on all threads that end when the token of the calling thread is set (esvr/progress.h). They
+/// Loops on all threads that end when the token of the calling thread is set (esvr/device.h). They
 /// are those of oneTBB. The decoder-only build has a file of this name with loops that nothing cancels.
 
 #include <tbb/blocked_range.h>
@@ -9,7 +9,7 @@
 
 #include <utility>
 
-#include "esvr/progress.h"
+#include "esvr/device.h"
 
 namespace esvr {
 

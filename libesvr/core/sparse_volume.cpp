@@ -1,7 +1,7 @@
 /// Volumes of bricks: how they are made, searched and measured; grids of vectors, which are three of them;
 /// and the index of their bricks.
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 #include "core/brick_index.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "esvr/vector_grid.h"
+#include "esvr/grid.h"
 
 namespace esvr {
 

@@ -1,6 +1,6 @@
 /// Voxels in memory or in files.
 
-#include "esvr/voxel_memory.h"
+#include "esvr/volume.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>

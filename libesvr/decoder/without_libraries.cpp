@@ -11,8 +11,8 @@
 
 #include "esvr/error.h"
 #include "esvr/volume.h"
+#include "format/bytes.h"
 #include "format/carried_bytes.h"
-#include "format/checksum.h"
 
 namespace {
 

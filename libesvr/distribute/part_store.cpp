@@ -16,7 +16,6 @@
 #include <utility>
 
 #include "core/atomic_file.h"
-#include "core/publish_file.h"
 #include "esvr/device.h"
 #include "esvr/error.h"
 

@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
 #include "field/line_form.h"
 
 namespace esvr {

@@ -14,7 +14,7 @@
 #include "core/brick_index.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 namespace {

@@ -9,9 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/brick_pairs.h"
 #include "field/line_form.h"
 #include "field/support.h"

@@ -17,7 +17,6 @@
 
 #include "core/geometry.h"
 #include "esvr/ellipsoids.h"
-#include "esvr/kernel.h"
 
 namespace esvr {
 

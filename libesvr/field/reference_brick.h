@@ -9,9 +9,8 @@
 #include <vector>
 
 #include "esvr/ellipsoids.h"
-#include "esvr/kernel.h"
-#include "esvr/sparse_volume.h"
-#include "esvr/stability.h"
+#include "esvr/field.h"
+#include "esvr/volume.h"
 #include "field/line_form.h"
 
 /// docs/math.md, "Rounding", counts the operations from which the constants follow.

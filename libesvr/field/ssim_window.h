@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "core/brick_index.h"
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

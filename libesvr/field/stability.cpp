@@ -1,7 +1,7 @@
 /// How precisely fields are evaluated: the definition in float64, the bound of the rounding in float32, the
 /// ellipsoids that are most difficult to evaluate, and the comparison of both on bricks of a field.
 
-#include "esvr/stability.h"
+#include "esvr/field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "core/parallel.h"
-#include "esvr/field.h"
 #include "field/evaluate.h"
 #include "field/reference_brick.h"
 

@@ -7,8 +7,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/line_form.h"
 
 namespace esvr {

@@ -8,11 +8,9 @@
 #include <limits>
 #include <span>
 
-#include "esvr/block_levels.h"
-#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
 #include "esvr/field.h"
-#include "esvr/kernel.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 
@@ -32,7 +30,7 @@ struct VoxelRule {
     return narrowBand ? background - std::fabs(settled) : std::fabs(settled - background);
   }
   [[nodiscard]] ESVR_HD bool isActive(float settled) const { return activity(settled) > threshold; }
-  /// The same with the threshold of a level (block_levels.h).
+  /// The same with the threshold of a level (ellipsoids.h).
   [[nodiscard]] ESVR_HD bool isActive(float settled, int level) const {
     return activity(settled) > thresholdAt(threshold, level);
   }

@@ -1,4 +1,4 @@
-#include "esvr/work_estimate.h"
+#include "esvr/field.h"
 
 #include <algorithm>
 

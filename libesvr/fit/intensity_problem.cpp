@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "esvr/progress.h"
+#include "esvr/device.h"
 #include "fit/cuda/make_cuda.h"
 
 namespace esvr {

@@ -10,7 +10,7 @@
 
 #include "esvr/device.h"
 #include "esvr/ellipsoids.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/voxel_rule.h"
 
 namespace esvr {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <numbers>
 
-#include "esvr/coord.h"
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 #include "fit/ellipsoid.h"
 
 namespace esvr {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "esvr/fit.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "fit/adam.h"
 #include "fit/seed.h"
 #include "fit/tuning.h"

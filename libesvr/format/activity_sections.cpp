@@ -9,7 +9,7 @@
 #include "codec/brick_coder.h"
 #include "codec/level_coder.h"
 #include "codec/past_voxels.h"
-#include "core/axes.h"
+#include "core/geometry.h"
 #include "esvr/error.h"
 #include "format/bytes.h"
 #include "format/voxel_section.h"

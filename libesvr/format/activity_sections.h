@@ -1,6 +1,6 @@
 #pragma once
 /// The sections that say where voxels are active: the positions of bricks, masks, and levels of thresholds
-/// (esvr/block_levels.h).
+/// (esvr/ellipsoids.h).
 
 #include <cstddef>
 #include <span>
@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "core/memory_budget.h"
-#include "esvr/block_levels.h"
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 
 namespace esvr::format {
 

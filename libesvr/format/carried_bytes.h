@@ -2,7 +2,7 @@
 /// The bytes of carried grids, as sections. They may be too large for the heap, and Blosc compresses them,
 /// because a compressor of records would take minutes for gigabytes. Nothing else in a file needs Blosc.
 
-#include "esvr/voxel_memory.h"
+#include "esvr/volume.h"
 #include "format/section_table.h"
 
 namespace esvr::format {

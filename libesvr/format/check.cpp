@@ -6,7 +6,7 @@
 
 #include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/sequence_file.h"
 #include "format/bytes.h"
 #include "format/frame_table.h"

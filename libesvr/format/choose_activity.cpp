@@ -14,9 +14,9 @@
 
 #include "core/brick_index.h"
 #include "core/parallel.h"
-#include "esvr/simplified_mask.h"
-#include "field/active_region.h"
-#include "field/brick_batches.h"
+#include "esvr/quantised.h"
+#include "field/evaluate.h"
+#include "field/voxel_rule.h"
 
 namespace esvr::format {
 

@@ -1,6 +1,6 @@
 #pragma once
 /// Chooses the thresholds by which the voxels of a sum of ellipsoids are active: one for the grid, or levels of blocks
-/// (esvr/block_levels.h).
+/// (esvr/ellipsoids.h).
 
 #include <array>
 #include <cstdint>
@@ -8,10 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "esvr/block_levels.h"
-#include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/voxel_rule.h"
 #include "format/activity_sections.h"
 
@@ -52,7 +50,7 @@ struct LevelTask {
 };
 
 /// The levels that take the fewest bits among those found whose overlap with the source suffices
-/// (MaskOverlap, esvr/simplified_mask.h). A voxel in the wrong state costs the more, the more it
+/// (MaskOverlap, esvr/quantised.h). A voxel in the wrong state costs the more, the more it
 /// adds to the squared error. The result is the same for any number of threads.
 /// \return nothing if no levels suffice
 [[nodiscard]] std::optional<Levels> chooseLevels(const LevelTask& task);

@@ -10,9 +10,9 @@
 
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
-#include "field/active_region.h"
+#include "field/voxel_rule.h"
 #include "format/grid_rule.h"
 
 namespace esvr {

@@ -12,8 +12,8 @@
 #include "codec/brick_coder.h"
 #include "codec/lattice.h"
 #include "codec/range_coder.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
-#include "core/rotation.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 

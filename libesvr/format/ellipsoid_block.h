@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/quantised.h"
+#include "esvr/volume.h"
 #include "format/bytes.h"
 
 namespace esvr::format {

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/axes.h"
+#include "core/geometry.h"
 #include "esvr/error.h"
 
 namespace esvr::format {

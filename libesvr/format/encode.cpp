@@ -11,7 +11,7 @@
 #include "codec/brick_coder.h"
 #include "core/atomic_file.h"
 #include "esvr/container.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "format/activity_sections.h"
 #include "format/ellipsoid_sections.h"
 #include "format/predicted_sections.h"

@@ -1,6 +1,6 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 namespace esvr {
 namespace {

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/empty_signs.h"
 #include "esvr/grid_coding.h"
-#include "field/active_region.h"
+#include "esvr/volume.h"
+#include "field/voxel_rule.h"
 #include "format/choose_activity.h"
 #include "format/grid_rule.h"
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "esvr/carried_grid.h"
 #include "esvr/container.h"
-#include "esvr/fit_record.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/grid.h"
 #include "format/bytes.h"
 #include "format/section_reader.h"
 #include "format/section_table.h"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "esvr/container.h"
-#include "esvr/voxel_layer.h"
-#include "esvr/voxel_memory.h"
+#include "esvr/quantised.h"
+#include "esvr/volume.h"
 #include "format/frame_table.h"
 #include "format/section_table.h"
 

@@ -6,9 +6,9 @@
 #include <optional>
 #include <utility>
 
-#include "core/partial_file.h"
+#include "core/atomic_file.h"
 #include "esvr/error.h"
-#include "esvr/frame_coding.h"
+#include "esvr/grid_coding.h"
 #include "format/decode.h"
 #include "format/encode.h"
 #include "format/frame_table.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/memory_budget.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 #include "format/bytes.h"
 
 namespace esvr::format {

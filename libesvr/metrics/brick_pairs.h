@@ -5,8 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr::metrics {
 

@@ -13,12 +13,9 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "esvr/sign_errors.h"
-#include "esvr/temporal_metrics.h"
-#include "esvr/vector_metrics.h"
+#include "esvr/volume.h"
 #include "metrics/brick_pairs.h"
 
 namespace esvr {

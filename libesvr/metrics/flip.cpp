@@ -2,7 +2,7 @@
 /// the eye sees them and compared; edges and points are found in the luminance; both differences are
 /// joined. Filters are products of a filter along x and one along y, or sums of these.
 
-#include "esvr/flip.h"
+#include "esvr/image_metrics.h"
 
 #include <algorithm>
 #include <array>

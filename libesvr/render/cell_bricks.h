@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "core/cell_corner.h"
-#include "esvr/sparse_volume.h"
+#include "core/geometry.h"
+#include "esvr/volume.h"
 #include "render/brick_march.h"
 
 namespace esvr {

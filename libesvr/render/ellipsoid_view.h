@@ -19,9 +19,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/rotation.h"
+#include "core/geometry.h"
+#include "esvr/ellipsoids.h"
 #include "esvr/field.h"
-#include "esvr/kernel.h"
 #include "render/view.h"
 
 namespace esvr {
@@ -44,7 +44,7 @@ ESVR_HD inline Matrix3 unitRotation(const PackedEllipsoid& e) {
 }
 
 /// The constants of a kernel in base 2: phi(m) = numerator / (plateau + 2^(m log2(e) - shift)) -
-/// base for m < cutoff. KernelConstants (kernel.h) has them in base e.
+/// base for m < cutoff. KernelConstants (ellipsoids.h) has them in base e.
 struct RayKernel {
   float numerator, plateau, shift, base, cutoff;
 };

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "render/brick_march.h"
 
 namespace esvr {

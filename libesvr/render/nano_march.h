@@ -12,7 +12,7 @@
 #define ESVR_NANOVDB_MATH nanovdb
 #endif
 
-#include "esvr/nano_volume.h"
+#include "esvr/vdb_io.h"
 #include "render/sample_rule.h"
 
 namespace esvr {

@@ -1,4 +1,4 @@
-#include "esvr/progressive.h"
+#include "esvr/render.h"
 
 #include <algorithm>
 #include <chrono>

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "core/parallel.h"
-#include "field/active_region.h"
+#include "field/voxel_rule.h"
 
 namespace esvr {
 

@@ -1,5 +1,5 @@
 #pragma once
-/// Drawing on the CPU: the functions behind the renderers of esvr/renderer.h, and the voxels that
+/// Drawing on the CPU: the functions behind the renderers of esvr/render.h, and the voxels that
 /// they keep from picture to picture.
 
 #include <array>
@@ -10,8 +10,8 @@
 
 #include "core/brick_index.h"
 #include "esvr/field.h"
-#include "esvr/renderer.h"
-#include "field/brick_evaluator.h"
+#include "esvr/render.h"
+#include "field/evaluate.h"
 #include "field/voxel_rule.h"
 #include "render/cell_bricks.h"
 #include "render/picture.h"

@@ -2,7 +2,7 @@
 #include <stdexcept>
 
 #include "core/parallel.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "render/nano_march.h"
 #include "render/picture.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/brick_index.h"
-#include "core/cell_corner.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "render/picture.h"
 #include "render/render_cells.h"

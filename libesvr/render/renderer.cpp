@@ -1,12 +1,11 @@
 // Makes renderers, which keep voxels from picture to picture, for the CPU or a CUDA device.
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 
 #include <chrono>
 #include <memory>
 #include <string>
 #include <utility>
 
-#include "esvr/device_bricks.h"
 #include "esvr/error.h"
 #include "render/cuda/cuda_renderers.h"
 #include "render/render_cells.h"

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
 #include "esvr/transfer_function.h"
 
 namespace esvr {

@@ -7,12 +7,11 @@
 #include <limits>
 #include <numbers>
 
-#include "core/cell_corner.h"
+#include "core/geometry.h"
 #include "esvr/camera.h"
-#include "esvr/coord.h"
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
 #include "esvr/render.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

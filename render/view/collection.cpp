@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-#include "cli/names.h"
-#include "cli/sequence.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
+#include "programs/names.h"
+#include "programs/sequence.h"
 
 namespace esvr::view {
 

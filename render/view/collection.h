@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "cli/frame_range.h"
 #include "esvr/sequence_file.h"
+#include "programs/frames.h"
 #include "render/scene.h"
 #include "render/view/requests.h"
 

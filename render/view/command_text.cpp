@@ -7,7 +7,7 @@
 #include <initializer_list>
 #include <utility>
 
-#include "cli/shell_word.h"
+#include "programs/messages.h"
 #include "render/view/painting.h"
 
 namespace esvr::view {

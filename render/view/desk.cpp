@@ -6,8 +6,8 @@
 #include <optional>
 #include <span>
 
-#include "cli/failure.h"
-#include "cli/version_text.h"
+#include "programs/help_text.h"
+#include "programs/run_main.h"
 #include "render/look.h"
 #include "render/png_file.h"
 #include "render/view/command_text.h"

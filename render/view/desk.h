@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "render/view/collection.h"
 #include "render/view/outlet.h"
 #include "render/view/studio.h"

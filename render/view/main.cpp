@@ -17,17 +17,16 @@
 #include <system_error>
 #include <vector>
 
-#include "cli/command_line.h"
-#include "cli/device_option.h"
-#include "cli/host_memory.h"
-#include "cli/log.h"
-#include "cli/run_main.h"
-#include "cli/thread_limit.h"
 #include "esvr/error.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
+#include "programs/command_line.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
+#include "programs/run_main.h"
+#include "programs/video_file.h"
+#include "programs/workers.h"
 #include "render/view/page.h"
 #include "render/view/server.h"
-#include "report/child_program.h"
 
 extern char** environ;
 

@@ -5,13 +5,11 @@
 #include <span>
 #include <stdexcept>
 
-#include "cli/bytes_file.h"
-#include "cli/output.h"
-#include "cli/sequence.h"
 #include "esvr/error.h"
+#include "programs/files.h"
+#include "programs/page.h"
+#include "programs/sequence.h"
 #include "render/view/collection.h"
-#include "report/base64.h"
-#include "report/escape.h"
 
 namespace esvr::view {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "cli/host_memory.h"
+#include "programs/memory.h"
 
 namespace esvr::view {
 

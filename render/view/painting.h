@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "esvr/image_metrics.h"
-#include "esvr/progressive.h"
+#include "esvr/render.h"
 #include "render/view/collection.h"
 #include "render/view/requests.h"
 
@@ -22,7 +22,7 @@ namespace esvr::view {
 [[nodiscard]] Image comparisonPicture(const Image& image, const Image& reference,
                                       const Comparison& comparison);
 
-/// Draws a scene in passes from coarse to fine (esvr/progressive.h), with its reference if it has
+/// Draws a scene in passes from coarse to fine (esvr/render.h), with its reference if it has
 /// one.
 class Painting {
  public:

@@ -11,11 +11,11 @@
 #include <string_view>
 #include <vector>
 
-#include "cli/choice.h"
-#include "cli/frame_range.h"
 #include "esvr/camera.h"
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
+#include "programs/frames.h"
+#include "programs/option_values.h"
 #include "render/options.h"
 
 namespace esvr::view {

@@ -4,10 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "cli/failure.h"
-#include "cli/stopwatch.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/memory_limit.h"
+#include "programs/run_main.h"
 #include "render/view/jpeg_file.h"
 
 namespace esvr::view {

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "esvr/progress.h"
+#include "esvr/device.h"
 #include "render/view/collection.h"
 #include "render/view/outlet.h"
 #include "render/view/painting.h"

@@ -2,7 +2,7 @@
 /// The five synthetic volumes on which the paper compares kinds of ellipsoids (appendix, 'Ellipsoid
 /// Type Comparison'). The paper shows slices and gives no formulas; these volumes are similar.
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "generators/voxelise.h"
 
 namespace esvr::samples {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "esvr/grid_descriptor.h"
+#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
 #include "generators/voxelise.h"
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "generators/voxelise.h"
 
 namespace esvr::samples {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "esvr/coord.h"
+#include "esvr/volume.h"
 #include "generators/vec3.h"
 #include "generators/voxelise.h"
 

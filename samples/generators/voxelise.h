@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "generators/vec3.h"
 
 namespace esvr::samples {

@@ -9,7 +9,7 @@
 
 #include <cstdio>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "ring.h"
 
 int main() {

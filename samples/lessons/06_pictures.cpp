@@ -9,7 +9,7 @@
 #include "esvr/error.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
-#include "esvr/progressive.h"
+#include "esvr/render.h"
 #include "ring.h"
 
 namespace {

@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 inline float ringValue(esvr::Coord v) {
   constexpr float kRadius = 16.0f, kThickness = 4.0f;

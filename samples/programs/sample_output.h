@@ -6,11 +6,11 @@
 #include <span>
 #include <string>
 
-#include "cli/log.h"
-#include "cli/memory.h"
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
+#include "programs/memory.h"
+#include "programs/messages.h"
 
 namespace esvr::samples {
 

@@ -7,15 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "cli/command_line.h"
-#include "cli/input_files.h"
-#include "cli/interrupts.h"
-#include "cli/output.h"
-#include "cli/run_main.h"
-#include "cli/thread_limit.h"
 #include "generators/sample_kinds.h"
 #include "generators/skeleton.h"
 #include "generators/tubes.h"
+#include "programs/command_line.h"
+#include "programs/files.h"
+#include "programs/run_main.h"
+#include "programs/workers.h"
 #include "sample_output.h"
 
 namespace {

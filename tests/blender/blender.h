@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "cli/converters.h"
-#include "cli/folder_test.h"
+#include "cli/run_program.h"
 
 namespace esvr::test {
 

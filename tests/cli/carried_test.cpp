@@ -18,12 +18,10 @@
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/metrics.h"
+#include "esvr/quantised.h"
 #include "esvr/vdb_io.h"
-#include "esvr/voxel_layer.h"
 #include "support/non_finite.h"
-#include "vdb/carried_bytes.h"
-#include "vdb/empty_grid.h"
-#include "vdb/nano_files.h"
+#include "vdb/foreign_grids.h"
 
 namespace esvr {
 namespace {

@@ -18,7 +18,7 @@
 #include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/vdb_io.h"
-#include "vdb/empty_grid.h"
+#include "vdb/foreign_grids.h"
 
 namespace esvr {
 namespace {

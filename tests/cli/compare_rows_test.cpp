@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "compare/finding.h"
-#include "compare/page_order.h"
 
 namespace esvr::compare {
 namespace {

@@ -16,10 +16,10 @@
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/metrics.h"
+#include "esvr/quantised.h"
 #include "esvr/vdb_io.h"
-#include "esvr/voxel_layer.h"
-#include "vdb/carried_bytes.h"
-#include "vdb/trees.h"
+#include "vdb/foreign_grids.h"
+#include "vdb/open_vdb.h"
 
 namespace esvr {
 namespace {

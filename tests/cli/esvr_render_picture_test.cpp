@@ -17,7 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/esvr_render_fixture.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 #include "support/on_device.h"
 
 namespace esvr::test {

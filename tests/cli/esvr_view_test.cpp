@@ -17,7 +17,6 @@
 #include "esvr/device.h"
 #include "programs/page.h"
 #include "render/view/view_client.h"
-#include "render/view/view_files.h"
 #include "support/search_path.h"
 
 namespace esvr::test {

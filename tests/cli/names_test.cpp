@@ -19,9 +19,9 @@
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
-#include "esvr/vector_metrics.h"
-#include "vdb/trees.h"
+#include "vdb/open_vdb.h"
 
 namespace esvr {
 namespace {

@@ -19,8 +19,8 @@
 #include "cli/converters.h"
 #include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
-#include "esvr/part_store.h"
 #include "esvr/vdb_io.h"
+#include "esvr/workers.h"
 #include "support/temporary_folder.h"
 
 namespace esvr {

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "vdb/empty_grid.h"
-#include "vdb/trees.h"
+#include "vdb/foreign_grids.h"
+#include "vdb/open_vdb.h"
 
 namespace esvr::test {
 namespace {

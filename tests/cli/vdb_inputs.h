@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/coord.h"
 #include "esvr/vdb_io.h"
-#include "vdb/carried_bytes.h"
+#include "esvr/volume.h"
+#include "vdb/foreign_grids.h"
 
 namespace esvr::test {
 

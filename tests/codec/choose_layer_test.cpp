@@ -18,7 +18,7 @@
 #include "codec/voxel_values.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 #include "format/voxel_section.h"
 
 namespace esvr {

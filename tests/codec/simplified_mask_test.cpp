@@ -4,7 +4,7 @@
 // of full bricks stay as they are. The result depends neither on the place of the volume nor on the
 // number of threads. The overlap itself is compared with a count voxel by voxel.
 
-#include "esvr/simplified_mask.h"
+#include "esvr/quantised.h"
 
 #include <gtest/gtest.h>
 

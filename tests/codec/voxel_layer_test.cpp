@@ -1,7 +1,7 @@
 // Plan: all halves have the values that IEEE 754 defines, and rounding finds the nearest of them. Codes of any size
 // have finite values.
 
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 
 #include <gtest/gtest.h>
 

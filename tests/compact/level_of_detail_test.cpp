@@ -1,7 +1,7 @@
 // Plan: firstLayers() and heaviest() return the right ellipsoids, and more ellipsoids come closer
 // to the whole grid.
 
-#include "esvr/level_of_detail.h"
+#include "esvr/compact.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // Plan: a residual gives every voxel of a narrow band the sign of its source, also for the rounding
 // differences of another machine, and belongs to all of the ellipsoids.
 
-#include "esvr/residual.h"
+#include "esvr/compact.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,7 @@
 #include "../fit/volumes.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
-#include "esvr/level_of_detail.h"
-#include "esvr/sign_errors.h"
+#include "esvr/metrics.h"
 
 namespace esvr {
 namespace {

@@ -8,9 +8,9 @@
 #include <cmath>
 
 #include "../fit/volumes.h"
+#include "esvr/compact.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
-#include "esvr/level_of_detail.h"
 #include "esvr/metrics.h"
 
 namespace esvr {

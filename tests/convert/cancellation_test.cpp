@@ -18,7 +18,6 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "esvr/residual.h"
 #include "esvr/vdb_io.h"
 #include "support/temporary_folder.h"
 

@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "../fit/volumes.h"
+#include "esvr/convert.h"
 #include "esvr/grid_coding.h"
-#include "esvr/voxel_reference.h"
 
 namespace esvr {
 namespace {

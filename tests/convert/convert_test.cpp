@@ -15,10 +15,8 @@
 
 #include "convert/volumes.h"
 #include "esvr/error.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "esvr/temporal_metrics.h"
 
 namespace esvr {
 namespace {

@@ -17,10 +17,10 @@
 #include "../fit/volumes.h"
 #include "convert/narrow_band.h"
 #include "esvr/convert.h"
-#include "esvr/empty_signs.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/sign_errors.h"
+#include "esvr/metrics.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 namespace {

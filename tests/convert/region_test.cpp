@@ -11,7 +11,6 @@
 
 #include "convert/volumes.h"
 #include "esvr/convert.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"

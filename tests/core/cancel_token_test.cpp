@@ -2,7 +2,7 @@
 // scope gives a thread its token and the tasks of a loop that of the thread that began it, and ends these
 // loops. In a completion, loops are not cancelled.
 
-#include "esvr/progress.h"
+#include "esvr/device.h"
 
 #include <gtest/gtest.h>
 

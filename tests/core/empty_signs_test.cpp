@@ -2,7 +2,7 @@
 // shells with one and with two hollows, a solid, and a shell with a hole through which the inside
 // reaches infinity. A place beyond the box is outside. Volumes at negative coordinates give the same.
 
-#include "esvr/empty_signs.h"
+#include "esvr/volume.h"
 
 #include <gtest/gtest.h>
 

@@ -9,8 +9,8 @@
 #include <array>
 #include <cmath>
 
-#include "esvr/block_levels.h"
-#include "esvr/coord.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 namespace {

@@ -2,7 +2,7 @@
 /// names and with names that would control a terminal. Each unique name finds its own grid, and so do
 /// the other forms that the header allows. Grids are paired in files of which one lacks some.
 
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,7 +1,7 @@
 // Plan: counts, ranges and the comparison follow from the values and their voxels alone, whatever the
 // order and the tiles. Any change of a value, a voxel or an axis makes values different.
 
-#include "esvr/inactive_values.h"
+#include "esvr/grid.h"
 
 #include <gtest/gtest.h>
 

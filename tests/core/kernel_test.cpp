@@ -1,6 +1,6 @@
 // Plan: kernelPhi, its derivatives by the constants' slope, and the constants, in float and double,
 // are compared with
-//  - the definition in kernel.h, typed as it stands there, in long double (whose range holds
+//  - the definition in ellipsoids.h, typed as it stands there, in long double (whose range holds
 //  e^1e4);
 //  - central differences of that definition, and its closed derivative by kappa where differences
 //    drown in rounding;
@@ -13,7 +13,7 @@
 // quotient and the difference add 4 u. With u = epsilon / 2 the total is 5.1 epsilon, rounded up to
 // 8.
 
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
 
 #include <gtest/gtest.h>
 

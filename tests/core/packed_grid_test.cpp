@@ -2,7 +2,7 @@
 // and its bricks are compared with the definition: a voxel is active if it is not below the threshold, or
 // differs from the background.
 
-#include "esvr/packed_grid.h"
+#include "esvr/grid.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // found. Components of vectors get the bricks and the active voxels of all of them, with their own
 // backgrounds, also if one has no brick; lengths are those of the vectors voxel by voxel.
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <string>
 
 #include "esvr/error.h"
-#include "esvr/vector_grid.h"
+#include "esvr/grid.h"
 
 namespace esvr {
 namespace {

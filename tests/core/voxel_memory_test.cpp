@@ -1,4 +1,4 @@
-#include "esvr/voxel_memory.h"
+#include "esvr/volume.h"
 
 #include <gtest/gtest.h>
 

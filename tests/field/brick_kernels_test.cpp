@@ -11,7 +11,7 @@
 #include <cmath>
 #include <limits>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/random_field.h"
 #include "field/ssim_window.h"
 

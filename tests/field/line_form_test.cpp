@@ -10,7 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/random_field.h"
 
 namespace esvr {

@@ -10,7 +10,7 @@
 // not change by more than its bound; this holds at the edge, at the end of the support, and for the
 // paper's kernel, which jumps there. The bound of m is compared with float32 arithmetic.
 
-#include "esvr/stability.h"
+#include "esvr/field.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,6 @@
 #include <cmath>
 #include <limits>
 
-#include "esvr/field.h"
 #include "field/line_form.h"
 #include "field/random_field.h"
 #include "field/reference_brick.h"

@@ -1,14 +1,13 @@
 // Plan: estimates are upper bounds of what the lists of an evaluation hold. They are refined if
 // they seem too large, and take no time for supports of any size. Work that is too large is refused
 // before it begins.
-#include "esvr/work_estimate.h"
+#include "esvr/field.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/field.h"
-#include "esvr/memory_limit.h"
 #include "field/evaluate.h"
 #include "field/random_field.h"
 

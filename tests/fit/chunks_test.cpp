@@ -9,11 +9,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "esvr/device_workers.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
+#include "esvr/workers.h"
 #include "fit/chunks/fit_in_chunks.h"
 #include "fit/cpu/cpu_pass.h"
 #include "random_ellipsoids.h"

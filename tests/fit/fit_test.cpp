@@ -13,7 +13,7 @@
 
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "esvr/voxel_layer.h"
+#include "esvr/quantised.h"
 #include "volumes.h"
 
 namespace esvr {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "../field/random_field.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "fit/adam.h"
 #include "fit/ellipsoid.h"
 #include "fit/target.h"
@@ -77,7 +77,7 @@ class SmallTarget {
   FitTarget target_;
 };
 
-/// The definition of esvr/kernel.h: ((1 + E) / (E + e^m) - eps) / (1 - eps) with E = e^kappa. For
+/// The definition of esvr/ellipsoids.h: ((1 + E) / (E + e^m) - eps) / (1 - eps) with E = e^kappa. For
 /// positive kappa both terms of the quotient are divided by E, which may be infinite.
 inline double phiByDefinition(double kappa, double m) {
   const double E = std::exp(kappa), eps = double(Kernel::kDefaultEpsilon);

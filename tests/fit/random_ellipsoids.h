@@ -5,9 +5,8 @@
 #include <vector>
 
 #include "../field/random_field.h"
-#include "esvr/coord.h"
-#include "esvr/kernel.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/ellipsoids.h"
+#include "esvr/volume.h"
 #include "fit/ellipsoid.h"
 
 namespace esvr::test {

@@ -7,7 +7,7 @@
 
 #include "../field/random_field.h"
 #include "esvr/field.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr::test {
 

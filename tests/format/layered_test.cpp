@@ -10,11 +10,11 @@
 #include <filesystem>
 #include <string>
 
+#include "esvr/compact.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "esvr/level_of_detail.h"
 #include "format/allocation_meter.h"
 #include "format/bytes.h"
 #include "format/crafted_file.h"

@@ -9,7 +9,6 @@
 #include <iterator>
 #include <random>
 
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
 #include "format/bytes.h"

@@ -19,7 +19,6 @@
 
 #include "../fit/volumes.h"
 #include "esvr/error.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/vdb_io.h"
 #include "format/sample_files.h"

@@ -15,7 +15,6 @@
 #include "../fit/volumes.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "format/bytes.h"
 #include "format/crafted_file.h"

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "compare/baseline.h"
+#include "compare/judge.h"
 #include "esvr/error.h"
 #include "fuzz/input_file.h"
 

@@ -9,7 +9,7 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "format/byte_source.h"
+#include "format/bytes.h"
 #include "format/decode.h"
 #include "fuzz/repair.h"
 

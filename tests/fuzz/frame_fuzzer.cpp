@@ -7,7 +7,6 @@
 #include <span>
 
 #include "esvr/error.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "fit/volumes.h"
 #include "fuzz/repair.h"

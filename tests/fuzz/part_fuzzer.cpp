@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "esvr/compact.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/level_of_detail.h"
 #include "fuzz/input_file.h"
 #include "fuzz/repair.h"
 

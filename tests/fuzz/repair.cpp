@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cstring>
 
-#include "format/checksum.h"
+#include "format/bytes.h"
 #include "format/frame_table.h"
-#include "format/layout.h"
+#include "format/section_table.h"
 
 namespace esvr::fuzz {
 namespace {

@@ -5,7 +5,7 @@
 #include <sstream>
 
 #include "esvr/error.h"
-#include "swc/skeleton.h"
+#include "generators/skeleton.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::istringstream text(std::string(reinterpret_cast<const char*>(data), size));

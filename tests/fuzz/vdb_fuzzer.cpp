@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "esvr/error.h"
-#include "esvr/sparse_volume.h"
 #include "esvr/vdb_io.h"
+#include "esvr/volume.h"
 #include "fuzz/input_file.h"
 
 namespace {

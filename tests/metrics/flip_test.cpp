@@ -9,7 +9,7 @@
 #include <cstdint>
 
 #include "esvr/error.h"
-#include "esvr/flip.h"
+#include "esvr/image_metrics.h"
 #include "support/on_threads.h"
 
 namespace esvr::test {

@@ -2,7 +2,7 @@
 // and shows the same view: a smooth picture is nearly right after the first pass, and passes become
 // better, also if the sides are not multiples of 8. The budget decides how many passes a call draws:
 // this is tested with a renderer that only waits. A cancelled pass leaves the last one.
-#include "esvr/progressive.h"
+#include "esvr/render.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "esvr/render.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr::test {
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "esvr/field.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
 

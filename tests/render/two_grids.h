@@ -1,7 +1,7 @@
 #pragma once
 /// Two grids that overlap in part, and a picture of both.
 
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "field/random_field.h"
 
 namespace esvr::test {

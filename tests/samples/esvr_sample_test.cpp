@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/refusal.h"
+#include "cli/run_program.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr {

@@ -7,10 +7,10 @@
 #include <span>
 #include <variant>
 
+#include "esvr/compact.h"
 #include "esvr/error.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
-#include "esvr/level_of_detail.h"
 #include "esvr/sequence_file.h"
 #include "python/src/objects.h"
 

@@ -11,8 +11,8 @@
 #include "esvr/convert.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -22,7 +22,7 @@ namespace {
 struct Ellipsoids {
   py::array_t<double> mu;
   py::array_t<float> scale, quaternion, intensity, kappa;
-  double epsilon = 0.0;  ///< the kernel's epsilon (kernel.h)
+  double epsilon = 0.0;  ///< the kernel's epsilon (ellipsoids.h)
 };
 
 /// Copies the ellipsoids of a chunk to row `first` and those after it.

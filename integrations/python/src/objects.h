@@ -15,8 +15,7 @@
 #include <vector>
 
 #include "esvr/container.h"
-#include "esvr/memory_limit.h"
-#include "esvr/progress.h"
+#include "esvr/device.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::python {

@@ -9,12 +9,11 @@
 #include <cstring>
 #include <limits>
 
-#include "esvr/empty_signs.h"
 #include "esvr/error.h"
+#include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "esvr/grid_names.h"
-#include "esvr/packed_grid.h"
 #include "esvr/sequence_file.h"
+#include "esvr/volume.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {

@@ -1,6 +1,6 @@
 // esvr.Grid.render and esvr.Volume.render.
 
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "esvr/error.h"
-#include "esvr/grid_names.h"
+#include "esvr/grid.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {

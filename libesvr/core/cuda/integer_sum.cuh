@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
 
 namespace esvr::cuda {
 

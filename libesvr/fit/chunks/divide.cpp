@@ -5,7 +5,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/axes.h"
+#include "core/geometry.h"
 #include "fit/cuda/make_cuda.h"
 #include "fit/tuning.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "esvr/fit.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 

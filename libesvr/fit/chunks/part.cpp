@@ -8,8 +8,8 @@
 #include <optional>
 #include <type_traits>
 
-#include "core/axes.h"
 #include "core/brick_index.h"
+#include "core/geometry.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"

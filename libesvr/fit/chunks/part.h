@@ -13,7 +13,6 @@
 
 #include "esvr/device.h"
 #include "esvr/fit.h"
-#include "esvr/part_runner.h"
 #include "fit/chunks/divide.h"
 #include "fit/run.h"
 

@@ -9,7 +9,7 @@
 #include "core/brick_index.h"
 #include "core/parallel.h"
 #include "field/brick_kernels.h"
-#include "field/evaluate_plan.h"
+#include "field/evaluate.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/intensity_problem.h"
 

@@ -7,7 +7,7 @@
 #include "core/add_seconds.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 #include "fit/cpu/residual.h"
 #include "fit/cuda/make_cuda.h"
 

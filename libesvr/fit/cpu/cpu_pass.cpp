@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 
 namespace esvr {
 namespace {

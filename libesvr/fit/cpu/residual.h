@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/brick_index.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "fit/optimiser.h"
 #include "fit/seed.h"
 

@@ -1,6 +1,6 @@
 // This file is compiled with approximate functions (CMakeLists.txt).
 
-#include "core/cuda/check.h"
+#include "core/cuda/runtime.h"
 #include "fit/cuda/brick_pass.cuh"
 
 namespace esvr::cuda {

@@ -7,8 +7,8 @@
 
 #include "core/cuda/integer_sum.cuh"
 #include "core/cuda/reduce.cuh"
-#include "esvr/sparse_volume.h"
-#include "field/line_math.h"
+#include "esvr/volume.h"
+#include "field/line_form.h"
 #include "fit/cuda/brick_pass.h"
 
 namespace esvr::cuda {

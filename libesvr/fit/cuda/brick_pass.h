@@ -8,8 +8,8 @@
 #include <bit>
 #include <cmath>
 
-#include "core/cuda/event.h"
 #include "core/cuda/integer_sum.cuh"
+#include "core/cuda/runtime.h"
 #include "field/brick_kernels.h"
 #include "fit/cuda/lists.h"
 

@@ -5,12 +5,11 @@
 #include <numeric>
 
 #include "core/add_seconds.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/count32.h"
-#include "core/cuda/use_device.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/runtime.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/progress.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 #include "fit/cuda/make_cuda.h"
 #include "fit/cuda/memory_plan.h"
 

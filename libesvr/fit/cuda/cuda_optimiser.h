@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/cuda/memory_pool.h"
-#include "core/cuda/stream.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/runtime.h"
 #include "fit/cuda/brick_pass.h"
 #include "fit/cuda/lists.h"
 #include "fit/cuda/relocation.h"

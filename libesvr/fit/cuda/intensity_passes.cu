@@ -4,16 +4,12 @@
 #include <algorithm>
 #include <string>
 
-#include "core/cuda/check.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/count32.h"
-#include "core/cuda/memory_pool.h"
-#include "core/cuda/stream.h"
-#include "core/cuda/thread_number.cuh"
-#include "core/cuda/use_device.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/runtime.h"
 #include "esvr/error.h"
 #include "field/brick_kernels.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 #include "field/voxel_rule.h"
 #include "fit/cuda/brick_pass.cuh"
 #include "fit/cuda/make_cuda.h"

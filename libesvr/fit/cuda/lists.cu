@@ -6,12 +6,9 @@
 #include <cub/device/device_reduce.cuh>
 #include <cub/device/device_scan.cuh>
 
-#include "core/cuda/copy.h"
-#include "core/cuda/count32.h"
-#include "core/cuda/launch.h"
+#include "core/cuda/device_buffer.h"
 #include "core/cuda/reduce.cuh"
-#include "core/cuda/temporary.h"
-#include "core/cuda/thread_number.cuh"
+#include "core/cuda/runtime.h"
 #include "fit/cuda/lists.h"
 
 namespace esvr::cuda {

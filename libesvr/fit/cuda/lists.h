@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <span>
 
-#include "core/brick_hash.h"
-#include "core/cuda/growing_buffer.h"
+#include "core/brick_index.h"
+#include "core/cuda/device_buffer.h"
 #include "field/support.h"
 #include "fit/ellipsoid.h"
 #include "fit/motion_bound.h"

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <string>
 
-#include "core/cuda/memory_pool.h"
+#include "core/cuda/device_buffer.h"
 #include "esvr/error.h"
 #include "fit/cuda/step.h"
 

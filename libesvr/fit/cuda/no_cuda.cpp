@@ -1,4 +1,4 @@
-#include "core/refuse_cuda.h"
+#include "core/device_choice.h"
 #include "fit/cuda/make_cuda.h"
 
 namespace esvr {

@@ -9,14 +9,11 @@
 #include <cub/device/device_select.cuh>
 #include <limits>
 
-#include "core/brick_hash.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/count32.h"
-#include "core/cuda/launch.h"
+#include "core/brick_index.h"
+#include "core/cuda/device_buffer.h"
 #include "core/cuda/reduce.cuh"
-#include "core/cuda/temporary.h"
-#include "core/cuda/thread_number.cuh"
-#include "esvr/sparse_volume.h"
+#include "core/cuda/runtime.h"
+#include "esvr/volume.h"
 
 namespace esvr::cuda {
 

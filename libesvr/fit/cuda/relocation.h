@@ -5,8 +5,8 @@
 
 #include <cuda_runtime_api.h>
 
-#include "core/cuda/growing_buffer.h"
-#include "esvr/coord.h"
+#include "core/cuda/device_buffer.h"
+#include "esvr/volume.h"
 #include "fit/adam.h"
 #include "fit/cuda/lists.h"
 #include "fit/cuda/step.h"

@@ -3,11 +3,9 @@
 #include <array>
 #include <cub/device/device_reduce.cuh>
 
-#include "core/cuda/copy.h"
-#include "core/cuda/launch.h"
+#include "core/cuda/device_buffer.h"
 #include "core/cuda/reduce.cuh"
-#include "core/cuda/temporary.h"
-#include "core/cuda/thread_number.cuh"
+#include "core/cuda/runtime.h"
 
 namespace esvr::cuda {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "core/cuda/growing_buffer.h"
+#include "core/cuda/device_buffer.h"
 #include "fit/adam.h"
 #include "fit/cuda/brick_pass.h"
 #include "fit/gradient.h"

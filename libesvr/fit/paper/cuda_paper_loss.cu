@@ -3,9 +3,9 @@
 #include <numeric>
 #include <vector>
 
-#include "core/cuda/check.h"
-#include "core/cuda/copy.h"
+#include "core/cuda/device_buffer.h"
 #include "core/cuda/reduce.cuh"
+#include "core/cuda/runtime.h"
 #include "fit/paper/ssim_math.h"
 
 namespace esvr::cuda {

@@ -5,15 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/cuda/check.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/count32.h"
-#include "core/cuda/launch.h"
-#include "core/cuda/memory_pool.h"
-#include "core/cuda/stream.h"
-#include "core/cuda/use_device.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/runtime.h"
 #include "esvr/error.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 #include "fit/cuda/brick_pass.cuh"
 #include "fit/cuda/lists.h"
 #include "fit/cuda/make_cuda.h"

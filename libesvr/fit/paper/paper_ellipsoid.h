@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/rotation.h"
-#include "esvr/kernel.h"
+#include "core/geometry.h"
+#include "esvr/ellipsoids.h"
 #include "fit/adam.h"
 
 namespace esvr::paper {

@@ -10,8 +10,7 @@
 
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "field/brick_halo.h"
-#include "field/dilate_bricks.h"
+#include "field/ssim_window.h"
 #include "fit/paper/ssim_math.h"
 
 namespace esvr {

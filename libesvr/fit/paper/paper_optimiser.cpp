@@ -6,7 +6,7 @@
 
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/cpu/residual.h"
 #include "fit/cuda/make_cuda.h"

@@ -1,7 +1,7 @@
 #pragma once
 /// 1 - SSIM of one window and its derivatives (paper_loss.h), for host and device.
 
-#include "esvr/kernel.h"
+#include "esvr/ellipsoids.h"
 #include "field/ssim_window.h"
 
 namespace esvr {

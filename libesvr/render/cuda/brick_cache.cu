@@ -3,9 +3,9 @@
 // when memory is short.
 #include <algorithm>
 
-#include "core/cuda/check.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/thread_number.cuh"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/reduce.cuh"
+#include "core/cuda/runtime.h"
 #include "render/cuda/cell_store.h"
 
 namespace esvr::cuda {

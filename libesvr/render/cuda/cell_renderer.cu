@@ -4,7 +4,7 @@
 #include <functional>
 #include <optional>
 
-#include "core/cuda/launch.h"
+#include "core/cuda/runtime.h"
 #include "render/cuda/cuda_renderers.h"
 #include "render/cuda/march_renderer.cuh"
 #include "render/picture.h"

@@ -11,12 +11,11 @@
 #include <utility>
 
 #include "core/brick_index.h"
-#include "core/cell_corner.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/use_device.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/runtime.h"
+#include "core/geometry.h"
 #include "field/brick_pairs.h"
-#include "field/count_bricks.h"
-#include "field/gather.h"
+#include "field/evaluate.h"
 #include "render/cuda/cuda_renderers.h"
 
 namespace esvr::cuda {

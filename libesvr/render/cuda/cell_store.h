@@ -11,10 +11,8 @@
 #include <vector>
 
 #include "core/cuda/device_buffer.h"
-#include "core/cuda/growing_buffer.h"
-#include "core/cuda/pinned.h"
 #include "esvr/field.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/line_form.h"
 #include "field/voxel_rule.h"
 #include "render/cell_bricks.h"
@@ -74,7 +72,7 @@ struct CellField {
   /// By brick: bit c is set if voxels in the brick of corner c (core/geometry.h) may differ from
   /// the background. Empty: all may.
   std::vector<std::uint8_t> corners;
-  /// The masks by which voxels are active, or the levels of their thresholds (block_levels.h), and
+  /// The masks by which voxels are active, or the levels of their thresholds (ellipsoids.h), and
   /// for each brick and corner the number of those of the voxels there, or BrickIndex::kNone.
   /// Otherwise empty.
   std::vector<BrickMask> masks;

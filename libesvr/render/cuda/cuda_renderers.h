@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 
 namespace esvr::cuda {
 
@@ -41,7 +41,7 @@ namespace esvr::cuda {
                                                               const RendererLimits& limits);
 
 /// Decodes given bricks of a field. The arguments and exceptions are those of evaluateBricksOn
-/// (esvr/device_bricks.h).
+/// (esvr/render.h).
 void decodeBricks(const Device& device, const Field& field, std::span<const Coord> corners,
                   std::span<float> out);
 

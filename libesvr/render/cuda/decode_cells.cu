@@ -1,12 +1,10 @@
 // Decodes bricks of cells from ellipsoids, and averages them for coarser levels of detail.
-#include "core/cell_corner.h"
-#include "core/cuda/check.h"
 #include "core/cuda/integer_sum.cuh"
-#include "core/cuda/launch.h"
 #include "core/cuda/reduce.cuh"
-#include "core/cuda/thread_number.cuh"
-#include "field/line_math.h"
-#include "field/local_box.h"
+#include "core/cuda/runtime.h"
+#include "core/geometry.h"
+#include "field/line_form.h"
+#include "field/voxel_rule.h"
 #include "render/cuda/cell_store.h"
 
 namespace esvr::cuda {

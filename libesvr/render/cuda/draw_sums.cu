@@ -2,8 +2,8 @@
 // algorithm 2). A block of threads takes a part of a tile (all of its depth, or a range of it) from
 // a queue and draws its bins from front to back. The block that finishes the last part of a tile
 // composites the parts.
-#include "core/cuda/check.h"
 #include "core/cuda/reduce.cuh"
+#include "core/cuda/runtime.h"
 #include "render/cuda/sum_frame.h"
 
 namespace esvr::cuda {

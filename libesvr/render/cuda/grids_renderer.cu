@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/cuda/launch.h"
+#include "core/cuda/runtime.h"
 #include "render/cuda/cuda_renderers.h"
 #include "render/cuda/march_renderer.cuh"
 #include "render/grids_march.h"

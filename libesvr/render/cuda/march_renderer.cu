@@ -4,10 +4,8 @@
 #include <climits>
 #include <string>
 
-#include "core/cuda/check.h"
 #include "core/cuda/reduce.cuh"
-#include "core/cuda/thread_number.cuh"
-#include "core/cuda/use_device.h"
+#include "core/cuda/runtime.h"
 #include "esvr/error.h"
 #include "render/picture.h"
 

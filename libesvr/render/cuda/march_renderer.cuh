@@ -9,10 +9,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/cuda/event.h"
-#include "core/cuda/growing_buffer.h"
-#include "core/cuda/stream.h"
-#include "esvr/renderer.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/runtime.h"
+#include "esvr/render.h"
 #include "render/cuda/cell_store.h"
 #include "render/sample_rule.h"
 

@@ -2,7 +2,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "core/cuda/check.h"
+#include "core/cuda/runtime.h"
 #include "render/cuda/cuda_renderers.h"
 #include "render/cuda/march_renderer.cuh"
 #include "render/nano_march.h"

@@ -1,4 +1,4 @@
-#include "core/refuse_cuda.h"
+#include "core/device_choice.h"
 #include "render/cuda/cuda_renderers.h"
 
 namespace esvr::cuda {

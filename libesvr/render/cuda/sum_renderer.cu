@@ -9,13 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "core/cuda/check.h"
 #include "core/cuda/device_buffer.h"
-#include "core/cuda/event.h"
 #include "core/cuda/reduce.cuh"
-#include "core/cuda/stream.h"
-#include "core/cuda/thread_number.cuh"
-#include "core/cuda/use_device.h"
+#include "core/cuda/runtime.h"
 #include "esvr/error.h"
 #include "render/cuda/cuda_renderers.h"
 #include "render/cuda/march_renderer.cuh"

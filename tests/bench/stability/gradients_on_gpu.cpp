@@ -1,4 +1,4 @@
-#include "core/cuda/use_device.h"
+#include "core/cuda/runtime.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "measure_gradients.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "esvr/device.h"
-#include "esvr/fit_record.h"
+#include "esvr/ellipsoids.h"
 #include "stability_cases.h"
 
 namespace esvr::bench {

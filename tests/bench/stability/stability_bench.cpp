@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "esvr/device_bricks.h"
-#include "esvr/stability.h"
+#include "esvr/field.h"
+#include "esvr/render.h"
 #include "measure_fits.h"
 #include "measure_gradients.h"
 #include "stability_cases.h"

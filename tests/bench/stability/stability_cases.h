@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "esvr/ellipsoids.h"
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "fit/gradient_scene.h"
 
 namespace esvr::bench {

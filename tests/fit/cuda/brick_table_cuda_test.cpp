@@ -5,9 +5,8 @@
 
 #include <algorithm>
 
-#include "core/cuda/copy.h"
 #include "core/cuda/device_buffer.h"
-#include "core/cuda/stream.h"
+#include "core/cuda/runtime.h"
 #include "fit/cuda/lists.h"
 #include "gpu_test.h"
 

@@ -1,7 +1,7 @@
 #pragma once
 /// Tests that call functions of CUDA themselves.
 
-#include "core/cuda/use_device.h"
+#include "core/cuda/runtime.h"
 #include "support/on_device.h"
 
 namespace esvr::test {

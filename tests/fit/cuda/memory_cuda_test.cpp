@@ -13,8 +13,7 @@
 
 #include "../random_ellipsoids.h"
 #include "../volumes.h"
-#include "core/cuda/memory_account.h"
-#include "core/cuda/memory_pool.h"
+#include "core/cuda/device_buffer.h"
 #include "esvr/convert.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"

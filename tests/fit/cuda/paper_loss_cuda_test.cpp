@@ -10,8 +10,8 @@
 
 #include "../paper/paper_loss_scene.h"
 #include "../random_ellipsoids.h"
-#include "core/cuda/copy.h"
-#include "core/cuda/stream.h"
+#include "core/cuda/device_buffer.h"
+#include "core/cuda/runtime.h"
 #include "fit/paper/paper_optimiser.h"
 #include "gpu_test.h"
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "esvr/coord.h"
+#include "esvr/volume.h"
 
 namespace esvr::test {
 

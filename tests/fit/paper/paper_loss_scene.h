@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "esvr/sparse_volume.h"
+#include "esvr/volume.h"
 #include "field/random_field.h"
 #include "fit/paper/dense_paper_loss.h"
 

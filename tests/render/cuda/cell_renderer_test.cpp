@@ -16,10 +16,9 @@
 #include <cmath>
 #include <thread>
 
-#include "esvr/device_bricks.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "field/random_field.h"
 #include "support/on_device.h"
 

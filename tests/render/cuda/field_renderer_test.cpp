@@ -11,7 +11,7 @@
 #include <limits>
 
 #include "esvr/error.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "field/random_field.h"
 #include "support/on_device.h"
 

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "esvr/error.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "field/random_field.h"
 #include "render/cuda/cell_store.h"
 #include "support/on_device.h"

@@ -6,7 +6,7 @@
 
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "esvr/renderer.h"
+#include "esvr/render.h"
 #include "field/random_field.h"
 #include "support/on_device.h"
 

@@ -15,7 +15,6 @@
 #include <span>
 
 #include "esvr/field.h"
-#include "esvr/frame_coding.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
