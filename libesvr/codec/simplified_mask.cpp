@@ -40,8 +40,8 @@ constexpr double kMaxFaint = 4.0;
 constexpr double kBlur = 0.5;
 
 constexpr double kLeastError = std::numeric_limits<float>::denorm_min();
-constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr int kColors = 8;
+constexpr double kNoPrice = std::numeric_limits<double>::infinity();
+constexpr int kBrickColors = 8;
 
 // ---- The bits that a mask takes
 
@@ -185,10 +185,10 @@ class Prices {
   /// The price of giving a voxel another state than it has in the volume.
   [[nodiscard]] double of(std::size_t b, int v) const {
     const bool active = volume_.active[b].test(v);
-    if (!active && !box_.contains(volume_.brickCorner(b) + voxelLocal(v))) return kNever;
-    if (active && keepsBox(b, v)) return kNever;
+    if (!active && !box_.contains(volume_.brickCorner(b) + voxelLocal(v))) return kNoPrice;
+    if (active && keepsBox(b, v)) return kNoPrice;
     const double faint = (active ? difference(b, v) : kBlur * aroundOf(b, v)) / error_;
-    return faint > kMaxFaint ? kNever : 1.0 + faint;
+    return faint > kMaxFaint ? kNoPrice : 1.0 + faint;
   }
 
  private:
@@ -244,7 +244,7 @@ class Prices {
 };
 
 /// Some voxels of a brick.
-struct Block {
+struct MaskBlock {
   Coord low;  ///< coordinates in the brick
   int side;
 
@@ -272,7 +272,7 @@ class BrickMoves {
   }
 
  private:
-  void tryBlock(const Block& block, MaskCube& cube) const {
+  void tryBlock(const MaskBlock& block, MaskCube& cube) const {
     if (isInside(block, cube)) return;
     std::array<bool, kBrickVoxels> before;
     std::size_t n = 0;
@@ -294,7 +294,7 @@ class BrickMoves {
 
   /// True if a change of the block can hardly save bits: all of its voxels are in one state, and in
   /// a block of one voxel also those beside it.
-  [[nodiscard]] static bool isInside(const Block& block, const MaskCube& cube) {
+  [[nodiscard]] static bool isInside(const MaskBlock& block, const MaskCube& cube) {
     const auto [x, y, z] = block.low;
     const bool state = cube.active(MaskCube::at(x, y, z));
     bool uniform = true;
@@ -311,7 +311,7 @@ class BrickMoves {
 
   /// The bits of the voxels of a block and of those whose contexts it is in, and the prices of its
   /// changes.
-  [[nodiscard]] double costOf(const Block& block, const MaskCube& cube) const {
+  [[nodiscard]] double costOf(const MaskBlock& block, const MaskCube& cube) const {
     double cost = 0.0;
     block.forEach(1, [&](int x, int y, int z) { cost += costs_.of(cube, MaskCube::at(x, y, z)); });
     block.forEach(0, [&](int x, int y, int z) {
@@ -441,7 +441,7 @@ class MaskSimplifier {
   BrickIndex index_;
   Prices prices_;
   std::vector<BrickMask> masks_;
-  std::array<std::vector<std::size_t>, kColors> byColor_;
+  std::array<std::vector<std::size_t>, kBrickColors> byColor_;
 };
 
 }  // namespace

@@ -66,7 +66,7 @@ VoxelLayer partNear(const VoxelLayer& layer, const VoxelLayer& sample) {
 }
 
 /// Sums over pairs of numbers.
-struct PairSums {
+struct ProductSums {
   double count = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
 
   void add(double a, double b) {
@@ -134,7 +134,7 @@ class Likeness {
   }
 
   std::array<double, 2> backgrounds_;
-  PairSums values_, above_, steps_;
+  ProductSums values_, above_, steps_;
   double inBoth_ = 0.0, inEither_ = 0.0;
 };
 

@@ -152,16 +152,14 @@ void removeIfLeftOver(const fs::path& path) {
   ::close(fd);
 }
 
-/// Removes this user's temporary files in a directory whose processes have ended. Errors are
-/// ignored; files that cannot be removed stay.
+}  // namespace
+
 void removeLeftOvers(const fs::path& directory) {
   std::error_code unreadable;
   for (fs::directory_iterator at(directory, unreadable), end; !unreadable && at != end;
        at.increment(unreadable))
     if (namedAsOurs(at->path().filename().string())) removeIfLeftOver(at->path());
 }
-
-}  // namespace
 
 // AtomicFile.
 

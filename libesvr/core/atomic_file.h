@@ -120,6 +120,10 @@ bool checkTarget(const std::filesystem::path& target, bool overwrite);
 void publishFile(const std::filesystem::path& file, const std::filesystem::path& target,
                  bool overwrite);
 
+/// Removes this user's temporary files in a directory whose processes have ended. Errors are
+/// ignored; files that cannot be removed stay.
+void removeLeftOvers(const std::filesystem::path& directory);
+
 /// Throws a RuntimeFailure that has a verb phrase, a path and the text of a system error.
 [[noreturn]] void failAt(const char* what, const std::filesystem::path& path, int error);
 

@@ -20,14 +20,14 @@ constexpr std::uint64_t mixed(std::uint64_t n) {
 /// The hash of a coordinate is the product of a hash of its block of 128 and of one of its place in
 /// the block, so that a tile of 4096 takes 32 steps.
 constexpr int kBlockLog2 = 7;
-constexpr std::int64_t kBlockSide = std::int64_t{1} << kBlockLog2;
+constexpr std::int64_t kEmptyBlockSide = std::int64_t{1} << kBlockLog2;
 
 constexpr std::uint64_t hashInBlock(std::int64_t place, std::uint64_t axis) {
   return mixed((std::uint64_t{1} << 48) + (axis << 32) + std::uint64_t(place));
 }
 constexpr std::uint64_t sumOfBlock(std::uint64_t axis) {
   std::uint64_t sum = 0;
-  for (std::int64_t place = 0; place < kBlockSide; ++place) sum += hashInBlock(place, axis);
+  for (std::int64_t place = 0; place < kEmptyBlockSide; ++place) sum += hashInBlock(place, axis);
   return sum;
 }
 /// By axis, from 1.
@@ -37,10 +37,10 @@ constexpr std::uint64_t kSumsOfBlock[] = {0, sumOfBlock(1), sumOfBlock(2), sumOf
 std::uint64_t hashesAlong(std::int32_t from, std::int32_t to, std::uint64_t axis) {
   std::uint64_t sum = 0;
   for (std::int64_t c = from; c <= to;) {
-    const std::int64_t place = c & (kBlockSide - 1),
-                       end = std::min(c - place + kBlockSide, to + std::int64_t{1});
+    const std::int64_t place = c & (kEmptyBlockSide - 1),
+                       end = std::min(c - place + kEmptyBlockSide, to + std::int64_t{1});
     std::uint64_t places = kSumsOfBlock[axis];
-    if (end - c < kBlockSide) {
+    if (end - c < kEmptyBlockSide) {
       places = 0;
       for (std::int64_t i = 0; i < end - c; ++i) places += hashInBlock(place + i, axis);
     }

@@ -82,15 +82,15 @@ std::vector<Coord> bricksOfCorners(std::span<const Coord> corners) {
 }
 
 /// Places of one brick as the kernels need them. Lanes without a place are at the first voxel.
-struct Block {
+struct PlaceLanes {
   alignas(64) float x[kPlacesPerBlock];
   alignas(64) float y[kPlacesPerBlock];
   alignas(64) float z[kPlacesPerBlock];
   alignas(64) float sum[kPlacesPerBlock];
   int count;
 
-  Block(std::span<const Place> places, std::span<const std::uint32_t> which, Coord corner,
-        float background) {
+  PlaceLanes(std::span<const Place> places, std::span<const std::uint32_t> which, Coord corner,
+             float background) {
     constexpr int kMultiple = PlaceBlock::kMultiple;
     count = (int(which.size()) + kMultiple - 1) / kMultiple * kMultiple;
     for (int i = 0; i < count; ++i) {
@@ -121,14 +121,14 @@ class PlaceEvaluator {
       for (std::size_t i = group.begin[b]; i < group.begin[b + 1]; i += kPlacesPerBlock) {
         const auto which =
             order.subspan(i, std::min<std::size_t>(kPlacesPerBlock, group.begin[b + 1] - i));
-        Block block(places, which, group.bricks[b] * kBrickSide, background_);
+        PlaceLanes block(places, which, group.bricks[b] * kBrickSide, background_);
         addPairs(group.bricks[b], block);
         for (std::size_t p = 0; p < which.size(); ++p) out[which[p]] = block.sum[p];
       }
   }
 
  private:
-  void addPairs(Coord brick, Block& block) const {
+  void addPairs(Coord brick, PlaceLanes& block) const {
     const std::uint32_t b = index_.find(brick);
     for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
       const std::uint32_t i = pairs_.ellipsoid[pair];

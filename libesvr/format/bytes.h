@@ -2,6 +2,7 @@
 /// Bytes of a file: writing and reading values, the checksum, and the sources from which a container is read piece by
 /// piece, so that a reader loads only what it needs, and allocates memory only for bytes that exist.
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -38,7 +39,9 @@ class ByteWriter {
   template <std::ranges::contiguous_range Values>
   void putAll(const Values& values) {
     const auto bytes = std::as_bytes(std::span(values));
-    bytes_.insert(bytes_.end(), bytes.begin(), bytes.end());
+    const std::size_t before = bytes_.size();
+    bytes_.resize(before + bytes.size());
+    std::ranges::copy(bytes, bytes_.begin() + std::ptrdiff_t(before));
   }
 
   /// Writes a length in 32 bits and then the bytes.
