@@ -462,7 +462,7 @@ std::vector<BrickMask> simplifiedMask(const SparseVolume& volume, double error,
 }
 
 std::span<const BrickMask> SimplifiedMasks::forError(double error) const {
-  const int exponent = int(std::lround(std::log2(std::max(error, kLeastError))));
+  const int exponent = int(std::lround(std::log2(std::max(error_.value_or(error), kLeastError))));
   const std::lock_guard lock(making_);
   auto& masks = byExponent_[exponent];
   if (!expected_) expected_ = makeExpected_ ? makeExpected_() : std::vector<BrickMask>{};

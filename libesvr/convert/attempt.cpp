@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -14,7 +15,14 @@
 namespace esvr::convert {
 namespace {
 
-constexpr std::uint32_t kShortFitDivisor = 4;  // a full fit has 4 times the iterations
+/// Iterations of a short fit: a quarter of a whole one's, and at most these. Tuning::forRun() makes the
+/// most of them.
+constexpr std::uint32_t kShortFitDivisor = 4, kPilotIterations = 100;
+/// A continued fit of fewer ellipsoids starts from this share of them, so that new ones find the places
+/// where those that were dropped are missed.
+constexpr double kGrownFrom = 0.9;
+/// Share of a whole fit's iterations that a continued fit has.
+constexpr double kContinuedShare = 0.4;
 
 std::size_t within(double count, std::uint64_t voxels) {
   return std::size_t(
@@ -46,18 +54,43 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   return result;
 }
 
-// Whether both signs are better (docs/lab-notes.md, "Signs").
-/// dB by which a fit with both signs must be better than one with the signs of the values.
+/// dB by which a fit with both signs must be better than one with the signs of the values
+/// (docs/lab-notes.md, "Signs").
 constexpr double kSignsGain = 0.25;
-/// Iterations of a short fit for each of a probe. Probes tell where a second short fit is useless.
-constexpr std::uint32_t kProbeDivisor = 4;
 
-/// The PSNR of the sum after a very short fit, as the device of the fit measures it. It suffices to
-/// compare two fits, and no grid has to be decoded.
-double psnrOfProbe(const ConvertInput& input, ConvertOptions options, double count) {
-  options.fit.iterations = std::max(plannedIterations(shortened(options.fit)) / kProbeDivisor, 1u);
-  const FitResult probe = fit(input.source, optionsFor({input, options}, count, FitLength::kWhole));
-  return probe.curve.back().psnrBox;
+/// The ellipsoids of a field that add most to it: those with the largest integral of their square.
+Field strongest(const Field& field, std::size_t count) {
+  struct Strength {
+    double strength;
+    std::size_t chunk, ellipsoid;
+  };
+  std::vector<Strength> all;
+  for (std::size_t c = 0; c < field.chunks.size(); ++c) {
+    const Ellipsoids& e = field.chunks[c].ellipsoids;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      const double logVolume = double(e.logScale[0][i]) + e.logScale[1][i] + e.logScale[2][i];
+      all.push_back({2.0 * std::log(std::abs(double(e.intensity[i]))) + logVolume, c, i});
+    }
+  }
+  std::ranges::stable_sort(all, std::greater<>(), &Strength::strength);
+  all.resize(std::min(count, all.size()));
+  const auto place = [](const Strength& s) { return std::pair(s.chunk, s.ellipsoid); };
+  std::ranges::sort(all, {}, place);
+  Field kept{field.background, field.kernel, {}};
+  for (const Chunk& chunk : field.chunks) kept.chunks.push_back({chunk.origin, {}});
+  for (const Strength& s : all) {
+    const Ellipsoids& from = field.chunks[s.chunk].ellipsoids;
+    Ellipsoids& to = kept.chunks[s.chunk].ellipsoids;
+    const auto take = [&](const auto& source, auto& target) {
+      if (!source.empty()) target.push_back(source[s.ellipsoid]);
+    };
+    for (std::size_t a = 0; a < 3; ++a) take(from.center[a], to.center[a]);
+    for (std::size_t a = 0; a < 3; ++a) take(from.logScale[a], to.logScale[a]);
+    for (std::size_t a = 0; a < 4; ++a) take(from.rotation[a], to.rotation[a]);
+    take(from.intensity, to.intensity);
+    take(from.kappa, to.kappa);
+  }
+  return kept;
 }
 
 /// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each
@@ -72,8 +105,6 @@ double psnrForItsBytes(const Job& job, const Attempt& attempt) {
 std::optional<Attempt> betterSigned(const Job& job, double count, const Attempt& own) {
   ConvertOptions both = job.options;
   both.fit.bothSigns = true;
-  if (psnrOfProbe(job.input, both, count) < psnrOfProbe(job.input, job.options, count) + kSignsGain)
-    return std::nullopt;
   Attempt found = attempt({job.input, both}, count, FitLength::kShort);
   if (psnrForItsBytes(job, found) < psnrForItsBytes(job, own) + kSignsGain) return std::nullopt;
   return found;
@@ -111,6 +142,13 @@ bool saturates(const SparseVolume& volume) {
     extreme +=
         isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
   return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
+}
+
+double shortFitBehind(const SparseVolume& volume) {
+  // smoke1 and wdas have 1.3 to 1.6. Volumes that saturate have 5 to 6 (dragon, aneurism), since a
+  // clamped voxel has no gradient.
+  constexpr double kUsual = 1.6, kSaturated = 5.0;
+  return saturates(volume) ? kSaturated : kUsual;
 }
 
 ActivityOptions activityOf(const Job& job) {
@@ -153,10 +191,8 @@ double psnrOf(const Job& job, const StoredGrid& grid) {
 }
 
 FitOptions shortened(FitOptions options) {
-  if (options.iterations)
-    options.iterations = std::max(*options.iterations / kShortFitDivisor, 1u);
-  else
-    options.preset = Preset::kDraft;
+  options.iterations =
+      std::clamp(plannedIterations(options) / kShortFitDivisor, 1u, kPilotIterations);
   return options;
 }
 
@@ -164,10 +200,20 @@ Attempt attempt(const Job& job, double count, FitLength length) {
   return attempted(job, optionsFor(job, count, length));
 }
 
+bool canContinue(const Attempt& from, double count) {
+  const double growth = count / double(std::max<std::size_t>(from.count(), 1));
+  return !from.cancelled() && growth >= 0.85 && growth <= 1.5;
+}
+
 Attempt continued(const Job& job, const Attempt& from, double count) {
-  const double more = std::max(count, double(from.count()));
-  FitOptions options = optionsFor(job, more, FitLength::kShort);
-  options.start = &from.grid.field;
+  FitOptions options = optionsFor(job, count, FitLength::kWhole);
+  options.iterations =
+      std::max(std::uint32_t(kContinuedShare * double(plannedIterations(options))), 1u);
+  const bool grows = *options.count >= from.count();
+  const Field start =
+      grows ? Field{}
+            : strongest(from.grid.field, std::size_t(kGrownFrom * double(*options.count)));
+  options.start = grows ? &from.grid.field : &start;
   return attempted(job, options);
 }
 

@@ -1,6 +1,7 @@
 #include "esvr/convert.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -206,6 +207,19 @@ std::vector<BrickMask> expectedMasks(const SparseVolume& source, const StoredGri
   return format::movedMask(maskOf(source), maskOf(before));
 }
 
+/// The root mean square of the errors at active voxels with which a grid has a PSNR; nothing for goals
+/// without one. All errors are taken to be at active voxels.
+std::optional<double> errorOf(const ConvertOptions& options, const SparseVolume& source) {
+  const double peak = options.fit.peak.value_or(peakOf(source));
+  if (std::holds_alternative<PresetGoal>(options.goal))
+    return peak * std::pow(10.0, -presetPsnr(options.fit.preset) / 20.0);
+  const auto* goal = std::get_if<PsnrGoal>(&options.goal);
+  if (!goal) return std::nullopt;
+  const Box box = options.fit.box.value_or(activeBox(source));
+  const double share = box.volume() / double(std::max<std::uint64_t>(activeVoxelCount(source), 1));
+  return peak * std::pow(10.0, -goal->psnr / 20.0) * std::sqrt(std::max(share, 1.0));
+}
+
 /// The mean of the active values, within their range.
 float meanOf(const SparseVolume& volume, const ValueRange& range) {
   double sum = 0.0, count = 0.0;
@@ -294,7 +308,8 @@ Conversion convertVolume(const ConvertInput& given, const ConvertOptions& option
   if (own.previous && own.previous->farBackground) own.previous = nullptr;
   SimplifiedMasks::MakeExpected expected;
   if (own.previous) expected = [&] { return expectedMasks(given.source, *own.previous); };
-  const SimplifiedMasks masks(given.source, std::move(expected));  // all attempts share them
+  const SimplifiedMasks masks(given.source, std::move(expected),
+                              errorOf(own, given.source));  // all attempts share them
   const ConvertInput input{given.descriptor, given.source,
                            given.simplified ? given.simplified : &masks};
   own.fit.cancel = CancelScope::token();

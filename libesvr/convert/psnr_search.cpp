@@ -17,8 +17,8 @@ namespace {
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
 constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
 constexpr double kNear = 1.3;  // factor of the number up to which a short fit is extrapolated
-constexpr double kMaxContinued = 1.5;  // largest growth of the number by a continued fit
-constexpr std::size_t kMaxFits = 4;    // the search continues if none reached the PSNR
+constexpr double kSteepestDbPerDoubling = 7.0;  // of short fits; aneurism has 6.7 dB
+constexpr std::size_t kMaxFits = 4;             // the search continues if none reached the PSNR
 // Smallest growth of the number of such a further fit. A PSNR that is missed, by however little, asks
 // for more; with less, the fits would tend to a number and never end.
 constexpr double kMinGrowth = 1.01;
@@ -39,6 +39,7 @@ class PsnrSearch {
         psnr_(psnr),
         compact_(job.options.storage.form == Storage::kCompact),
         margin_(compact_ ? kCompactMargin : kFloat32Margin),
+        behind_(shortFitBehind(job.input.source)),
         maxCount_(job.options.fit.count.value_or(activeVoxelCount(job.input.source))) {}
 
   void stayBelow(std::uint64_t bytes) {
@@ -61,12 +62,11 @@ class PsnrSearch {
       const CompactResult compact = compacted(job_, draft, {});
       const double price = priceOf(draft, compact) / kShortFitPrice;
       const double besides = double(bytesOfEllipsoids(compact.grid) - compact.bytes);
-      expected = std::uint64_t(besides + price * neededCount(draft, aim() - kShortFitBehind));
-      if (besides + price * neededCount(draft, aim() - kShortFitBehind - kUncertainty) >
-          double(*below_))
+      expected = std::uint64_t(besides + price * neededCount(draft, aim() - behind_));
+      if (besides + price * neededCount(draft, aim() - behind_ - kUncertainty) > double(*below_))
         return {std::nullopt, expected};
     }
-    if (!draft.cancelled()) fitUntilReached(scaledCount(draft, aim() - kShortFitBehind));
+    if (!draft.cancelled()) fitUntilReached(scaledCount(draft, aim() - behind_));
     if (attempts_.empty()) return {stored(cancelled(std::move(draft))), expected};
     return {anyReached() ? smallest() : best(), expected};
   }
@@ -81,11 +81,14 @@ class PsnrSearch {
   /// The attempt with the most ellipsoids from which a fit can continue; null if there is none.
   [[nodiscard]] const Attempt* startFor(double count) const {
     const Attempt* start = nullptr;
-    for (const Attempt& a : attempts_) {
-      const double from = pointOf(a).count;
-      const bool fits = from <= count && kMaxContinued * from >= count;
-      if (fits && (!start || a.count() > start->count())) start = &a;
-    }
+    const auto distance = [&](const Attempt& a) {
+      return std::abs(std::log(pointOf(a).count / count));
+    };
+    const auto consider = [&](const Attempt& a) {
+      if (canContinue(a, count) && (!start || distance(a) <= distance(*start))) start = &a;
+    };
+    if (draft_) consider(*draft_);
+    for (const Attempt& a : attempts_) consider(a);
     return start;
   }
 
@@ -103,20 +106,23 @@ class PsnrSearch {
     for (Attempt& a : attempts_) a.fit.end = FitEnd::kCancelled;
   }
 
-  /// True if the number of ellipsoids may suffice, even if the PSNR grows steeply.
+  /// True if ellipsoids may reach the PSNR within the bytes, by an extrapolation that favours them.
   [[nodiscard]] bool canReach(const Attempt& draft) const {
-    const double psnr = aim() - kShortFitBehind - kUncertainty;
-    return countFor(pointOf(draft), psnr, kMaxDbPerDoubling) <= double(maxCount_);
+    const double psnr = aim() - behind_ - kUncertainty;
+    const double count = countFor(pointOf(draft), psnr, kSteepestDbPerDoubling);
+    if (below_ && kBytesPerEllipsoid * count > double(*below_)) return false;
+    return count <= double(maxCount_);
   }
 
   /// A short fit whose number of ellipsoids is near the one that the PSNR needs, with the better
   /// signs. The first guess can be far from it, where signs and prices differ.
   [[nodiscard]] Attempt nearDraft() {
     Attempt draft = attempt(job_, firstCount(), FitLength::kShort);
-    const double count = capped(scaledCount(draft, aim() - kShortFitBehind));
+    const double count = capped(kContinuedFrom * scaledCount(draft, aim() - behind_));
     const double ratio = count / pointOf(draft).count;
     const bool isFar = std::max(ratio, 1.0 / ratio) > kNear;
-    if (!draft.cancelled() && isFar && canReach(draft)) {
+    if (!draft.cancelled() && !canReach(draft)) return draft;
+    if (!draft.cancelled() && isFar) {
       auto nearer = unlessCancelled(
           [&]() -> std::optional<Attempt> { return attempt(job_, count, FitLength::kShort); });
       if (!nearer) return cancelled(std::move(draft));
@@ -258,6 +264,7 @@ class PsnrSearch {
   std::optional<std::uint64_t> below_;
   bool compact_;
   Margin margin_;
+  double behind_;  ///< PSNR of a full fit less that of a short fit, dB
   std::uint64_t maxCount_;
   double slope_ = kDbPerDoubling;
   Decision bothSigns_;

@@ -32,7 +32,7 @@ class SizeSearch {
  public:
   SizeSearch(const Job& job, std::uint64_t bytes)
       : options_(job.options), job_{job.input, options_}, bytes_(bytes) {
-    draft_ = attempt(job_, double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
+    draft_ = attempt(job_, kContinuedFrom * double(bytes_) / kBytesPerEllipsoid, FitLength::kShort);
     draft_ = withBetterSigns(job_.input, std::move(draft_), options_);
     bothSigns_ = draft_.bothSigns;
   }
@@ -42,7 +42,8 @@ class SizeSearch {
 
   /// The PSNR to expect of a full fit. None follows a short fit that was cancelled.
   [[nodiscard]] double expected() const {
-    return draft_.psnr + (draft_.cancelled() ? 0.0 : kShortFitBehind) - kUsualLoss;
+    return draft_.psnr + (draft_.cancelled() ? 0.0 : shortFitBehind(job_.input.source)) -
+           kUsualLoss;
   }
 
   SizeResult run(std::optional<double> above) {
@@ -56,7 +57,9 @@ class SizeSearch {
     for (int repairs = 0; !last.cancelled(); ++repairs) {
       const std::uint64_t before = left_;
       auto fitted = unlessCancelled([&]() -> std::optional<Attempt> {
-        return attempt(job_, double(before) / each, FitLength::kWhole);
+        const double count = double(before) / each;
+        return canContinue(last, count) ? continued(job_, last, count)
+                                        : attempt(job_, count, FitLength::kWhole);
       });
       if (!fitted) break;  // the fit before is the best so far
       last = std::move(*fitted);

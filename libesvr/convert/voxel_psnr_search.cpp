@@ -114,15 +114,13 @@ class VoxelPsnrSearch {
   [[nodiscard]] std::optional<VoxelCandidate> withPlateau(double bound) const {
     const double levels = trials_.fewestLevels(psnr_, bound);
     if (levels == 0.0) return std::nullopt;
-    std::array<std::optional<VoxelCandidate>, kPlateauPrices.size()> made;
-    parallelFor(std::size_t{0}, made.size(), [&](std::size_t k) {
-      Trial trial = trials_.tryBound(trials_.boundOf(levels), kPlateauPrices[k]);
-      if (trial.psnr >= psnr_) made[k] = stored(std::move(trial));
-    });
-    const auto larger = [](const auto& a, const auto& b) {
-      return a && (!b || a->bytes < b->bytes);
-    };
-    return std::move(*std::min_element(made.begin(), made.end(), larger));
+    std::optional<Trial> best;  // a higher price takes fewer bytes
+    for (const double price : kPlateauPrices) {
+      Trial trial = trials_.tryBound(trials_.boundOf(levels), price);
+      if (trial.psnr < psnr_) break;
+      best = std::move(trial);
+    }
+    return best ? std::optional(stored(std::move(*best))) : std::nullopt;
   }
 
   const Job& job_;

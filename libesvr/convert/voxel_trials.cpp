@@ -25,7 +25,6 @@ constexpr double kErrorsKept = 0.25;
 constexpr double kPlateauShare = 0.02;
 /// Largest number of voxels that the trials in memory have together.
 constexpr std::size_t kVoxelsAtOnce = std::size_t{1} << 25;
-constexpr int kMaxLevels = 24;  // coarser lattices than the first that are tried for a plateau
 
 Plateau plateauOf(const SparseVolume& volume) {
   std::vector<float> values;
@@ -106,19 +105,19 @@ std::optional<Trial> VoxelTrials::nearestFor(double psnr) const {
 }
 
 double VoxelTrials::fewestLevels(double psnr, double bound) const {
-  const double from = levelsOf(bound) + 1.0;
-  const double to = std::max(std::floor(0.5 * from), std::max(from - kMaxLevels, 1.0));
-  std::vector<char> reaches(std::size_t(from - to) + 1);
-  const auto tryLevels = [&](std::size_t n) {
-    reaches[n] = tryBound(boundOf(to + double(n)), 0.0).psnr >= psnr;
-  };
-  tbb::task_arena arena(trialsAtOnce());
-  arena.execute([&, token = CancelScope::token()] {
-    const CancelScope scope(token);
-    parallelFor(std::size_t{0}, reaches.size(), tryLevels);
-  });
-  const auto first = std::find(reaches.begin(), reaches.end(), true);
-  return first == reaches.end() ? 0.0 : to + double(first - reaches.begin());
+  const double most = levelsOf(bound) + 1.0;
+  double fewest = 0.0;  // the fewest levels known to reach the PSNR
+  double low = std::floor(0.5 * most), high = most;
+  while (low <= high) {
+    const double middle = fewest == 0.0 && high == most ? high : std::floor(0.5 * (low + high));
+    if (middle >= 1.0 && tryBound(boundOf(middle), 0.0).psnr >= psnr)
+      fewest = middle, high = middle - 1.0;
+    else if (middle == most)
+      break;
+    else
+      low = middle + 1.0;
+  }
+  return fewest;
 }
 
 int VoxelTrials::trialsAtOnce() const {

@@ -95,9 +95,9 @@ class VoxelTrials {
   /// The same for the nearest codes.
   [[nodiscard]] std::optional<Trial> nearestFor(double psnr) const;
 
-  /// The smallest number of levels with which a lattice that has the plateau reaches a PSNR, near a
-  /// bound that reaches it; 0 if there is none. The PSNR is not monotone in the number of levels,
-  /// since there may be other plateaus.
+  /// The smallest number of levels found with which a lattice that has the plateau reaches a PSNR, near
+  /// a bound that reaches it; 0 if there is none. It is found by bisection, although the PSNR need not
+  /// be monotone in the number of levels where there are other plateaus.
   [[nodiscard]] double fewestLevels(double psnr, double bound) const;
 
   /// The number of trials that may be in memory at once.

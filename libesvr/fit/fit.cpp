@@ -60,7 +60,7 @@ RunPlan planFor(const FitTarget& target, const FitOptions& options, const Tuning
 /// Fits all bricks together.
 FitResult fitWhole(const SparseVolume& volume, const FitOptions& options,
                    const TargetScale& scale) {
-  const Tuning tuning;
+  const Tuning tuning = Tuning::forRun(plannedIterations(options));
   FitTarget target = makeTarget(volume, boxOf(volume, options.box), scale);
   applyOptions(options, target);
   Recorder recorder(target, options);

@@ -138,7 +138,7 @@ PartEnd fitPart(const FitScene& scene, const PartStart& start, const PartPlace& 
   applyOptions(scene.options, part.target);
   CommonFitOptions options = scene.options;
   options.progress = place.progress;
-  const Tuning tuning;
+  const Tuning tuning = Tuning::forRun(plannedIterations(scene.options));
   const auto turn = place.turns.take(place.device);
   Recorder recorder(part.target, options);
   const auto optimiser =

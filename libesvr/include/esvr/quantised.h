@@ -155,15 +155,20 @@ class SimplifiedMasks {
 
   /// \param volume    must outlive the object
   /// \param expected  makes the expected masks of simplifiedMask() when they are first needed
-  explicit SimplifiedMasks(const SparseVolume& volume, MakeExpected expected = {})
-      : volume_(volume), makeExpected_(std::move(expected)) {}
+  /// \param error     the error that the stored grid will have, if it is known before; there is only
+  ///                  one mask then
+  explicit SimplifiedMasks(const SparseVolume& volume, MakeExpected expected = {},
+                           std::optional<double> error = {})
+      : volume_(volume), makeExpected_(std::move(expected)), error_(error) {}
 
-  /// The mask for an error, which is rounded to a power of two. It is kept as long as the object.
+  /// The mask for the known error, or else for this one, which is rounded to a power of two. It is kept
+  /// as long as the object.
   [[nodiscard]] std::span<const BrickMask> forError(double error) const;
 
  private:
   const SparseVolume& volume_;
   MakeExpected makeExpected_;
+  std::optional<double> error_;
   mutable std::mutex making_;
   mutable std::optional<std::vector<BrickMask>> expected_;
   mutable std::map<int, std::vector<BrickMask>> byExponent_;
