@@ -85,7 +85,7 @@ void putPoints(Json& json, const OpacityCurve& curve) {
   json.raw("]");
 }
 
-/// The look that esvr-render gives a grid without options (render/render_options.cpp).
+/// The look that esvr-render gives a grid without options (render/look.cpp).
 TransferFunction usualLook(const StoredGrid& grid) {
   const float background = float(grid.descriptor.background);
   if (grid.descriptor.gridClass == GridClass::kLevelSet && background > 0.0f)
