@@ -13,7 +13,7 @@
 namespace esvr {
 namespace {
 
-constexpr std::uint32_t kWholeFit = 400, kContinuedFit = 100;
+constexpr std::uint32_t kWholeFit = 400, kContinuedFit = 160;
 
 convert::PsnrResult search(double psnr, ConvertOptions options) {
   const GridDescriptor descriptor;
@@ -32,7 +32,7 @@ std::uint32_t iterationsFor(double psnr) {
   return found.conversion->fit.curve.back().iteration;
 }
 
-TEST(PsnrSearch, SlowContinuesAFitWithTooFewEllipsoids) {
+TEST(PsnrSearch, SlowContinuesAFitOfAboutAsManyEllipsoids) {
   bool whole = false, continued = false;
   for (const double psnr : {28.0, 30.0, 32.0, 34.0, 36.0, 38.0}) {
     const std::uint32_t iterations = iterationsFor(psnr);
