@@ -31,8 +31,8 @@ struct Pair {
 };
 
 /// Grids that --ignore-grids names are left out. Where both files have the same number of grids of
-/// a name, it stands for the grids with this number in both; where the candidate has fewer, for
-/// that of the reference, whose other grids are then paired with those of the candidate.
+/// a name, it stands for the grids with this number in both. Where the candidate has fewer, it stands for
+/// the grid of the reference alone; the other grids of the reference are then paired with the candidate's.
 class Pairing {
  public:
   Pairing(const CheckOptions& options, const GridFile& reference, const GridFile& candidate)

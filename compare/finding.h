@@ -41,8 +41,8 @@ struct RowGroup {
   bool ofOneSize = false;  ///< whether the rows were searched for one size
 };
 
-/// Each row of ESVR, the rows of its size and those of its PSNR come first. The other groups follow
-/// in their order.
+/// Each row of ESVR, the rows of its size and those of its PSNR come first. The other groups keep
+/// their order and follow.
 class PageOrder {
  public:
   /// \param record  must outlive the order

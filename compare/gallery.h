@@ -73,8 +73,8 @@ class Gallery {
   ImageFigures referenceCost_;
 };
 
-/// Makes the renderer of a row's pictures: of a NanoVDB grid of this value type on a CUDA device,
-/// of the volume itself on the CPU.
+/// Makes the renderer of a row's pictures. On a CUDA device it draws a NanoVDB grid of this value type,
+/// and on the CPU the volume itself.
 /// \throws DeviceError  as for makeNanoRenderer
 [[nodiscard]] std::unique_ptr<Renderer> makeVoxelRenderer(const SparseVolume& volume,
                                                           NanoValues values, const Device& device);

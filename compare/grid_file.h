@@ -120,7 +120,7 @@ class FrameSource {
 
   cli::FramePattern pattern_;
   cli::HostMemory memory_;
-  cli::FrameListing listing_;               ///< of a file with all frames: its frames only
+  cli::FrameListing listing_;               ///< The frames of a file that has all of them.
   std::unique_ptr<SequenceReader> reader_;  ///< null: each frame is a file
 };
 

@@ -55,8 +55,8 @@ struct TableColumn {
 /// rival.
 [[nodiscard]] report::Html duelSection(const std::vector<Duel>& duels, const TableRecord& record);
 
-/// A chart of errors on logarithmic axes, without series: the root mean square error over the box
-/// as a share of the peak, with PSNR as a second scale. \param title  its title
+/// A chart of errors on logarithmic axes, without series. Its axis has the root mean square error over the
+/// box as a share of the peak, and PSNR as a second scale. \param title  the title of the chart
 [[nodiscard]] report::Chart errorOverBytes(const std::string& title);
 [[nodiscard]] report::Chart errorOverSeconds(const std::string& title);
 

@@ -141,12 +141,13 @@ double roundingError(const SparseVolume& volume, double bound) {
   return (largestMagnitude(volume) + bound) * 0x1p-24;
 }
 
-/// The largest bound on values before they are rounded to halfs, with which the bound usually holds
-/// for the halfs. Where halfs are u apart and the source's value is a half, a value that is d off is
+/// The largest bound on values before they are rounded to halfs. With it, the halfs usually keep to the
+/// bound. Where halfs are u apart and the source's value is a half, a value that is d off is
 /// off by a multiple of u after it is rounded, which exceeds the bound unless d is below
 /// (floor(bound / u) + 1/2) u.
 double boundBeforeRounding(const SparseVolume& volume, double bound) {
-  constexpr int kMantissa = 10, kLowest = -14, kHighest = 15;  // of a half: bits, exponents
+  constexpr int kMantissa = 10, kLowest = -14,
+                kHighest = 15;  // a half has these bits and exponents
   const double largest = largestMagnitude(volume);
   // A value that is off by the bound may lie beyond the next power of 2, where halfs are farther apart.
   const int last =

@@ -56,8 +56,8 @@ struct Halo {
   }
 
   /// Calls visit(cell, neighbour, offset) for the cells of the voxels that lie before brick b.
-  /// `neighbour` is the brick that has the voxel, or BrickIndex::kNone, and `offset` is the place
-  /// of the voxel in its brick.
+  /// `neighbour` is the brick that has the voxel, or BrickIndex::kNone, and `offset` says where in
+  /// its brick the voxel is.
   template <class Index, class Visit>
   static void forEachBefore(const VoxelLayer& layer, const Index& index, std::size_t b,
                             const Visit& visit) {

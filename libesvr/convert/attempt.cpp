@@ -18,8 +18,8 @@ namespace {
 /// Iterations of a short fit: a quarter of a whole one's, and at most these. Tuning::forRun() makes the
 /// most of them.
 constexpr std::uint32_t kShortFitDivisor = 4, kPilotIterations = 100;
-/// A continued fit of fewer ellipsoids starts from this share of them, so that new ones find the places
-/// where those that were dropped are missed.
+/// A continued fit of fewer ellipsoids starts from this share of them. New ones then find the places
+/// that miss those that were dropped.
 constexpr double kGrownFrom = 0.9;
 /// Share of a whole fit's iterations that a continued fit has.
 constexpr double kContinuedShare = 0.4;
@@ -201,8 +201,9 @@ Attempt attempt(const Job& job, double count, FitLength length) {
 }
 
 bool canContinue(const Attempt& from, double count) {
+  constexpr double kLeastGrowth = 0.85, kMostGrowth = 1.5;
   const double growth = count / double(std::max<std::size_t>(from.count(), 1));
-  return !from.cancelled() && growth >= 0.85 && growth <= 1.5;
+  return !from.cancelled() && growth >= kLeastGrowth && growth <= kMostGrowth;
 }
 
 Attempt continued(const Job& job, const Attempt& from, double count) {

@@ -17,7 +17,7 @@ namespace {
 constexpr double kVoxelsPerEllipsoid = 35.0;  // active voxels per ellipsoid of the first guess
 constexpr double kMaxGrowth = 8.0;            // largest factor of the number between two fits
 constexpr double kNear = 1.3;  // factor of the number up to which a short fit is extrapolated
-constexpr double kSteepestDbPerDoubling = 7.0;  // of short fits; aneurism has 6.7 dB
+constexpr double kSteepestDbPerDoubling = 7.0;  // short fits of aneurism gain 6.7 dB
 constexpr std::size_t kMaxFits = 4;             // the search continues if none reached the PSNR
 // Smallest growth of the number of such a further fit. A PSNR that is missed, by however little, asks
 // for more; with less, the fits would tend to a number and never end.

@@ -105,19 +105,15 @@ std::optional<Trial> VoxelTrials::nearestFor(double psnr) const {
 }
 
 double VoxelTrials::fewestLevels(double psnr, double bound) const {
-  const double most = levelsOf(bound) + 1.0;
-  double fewest = 0.0;  // the fewest levels known to reach the PSNR
-  double low = std::floor(0.5 * most), high = most;
-  while (low <= high) {
-    const double middle = fewest == 0.0 && high == most ? high : std::floor(0.5 * (low + high));
-    if (middle >= 1.0 && tryBound(boundOf(middle), 0.0).psnr >= psnr)
-      fewest = middle, high = middle - 1.0;
-    else if (middle == most)
-      break;
-    else
-      low = middle + 1.0;
+  const auto reaches = [&](double levels) { return tryBound(boundOf(levels), 0.0).psnr >= psnr; };
+  double enough = levelsOf(bound) + 1.0;
+  if (!reaches(enough)) return 0.0;
+  double tooFew = std::max(std::floor(0.5 * enough) - 1.0, 0.0);
+  while (enough - tooFew > 1.0) {
+    const double middle = std::floor(0.5 * (tooFew + enough));
+    (reaches(middle) ? enough : tooFew) = middle;
   }
-  return fewest;
+  return enough;
 }
 
 int VoxelTrials::trialsAtOnce() const {

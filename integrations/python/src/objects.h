@@ -88,8 +88,8 @@ Result waitFor(std::future<Result>& call, CancelToken& token) {
   return call.get();
 }
 
-/// Runs a call that takes long on another thread. The loops of the library look at the token, so
-/// that the call ends soon after Ctrl-C.
+/// Runs a call that takes long on another thread. The loops of the library look at the token.
+/// The call therefore ends soon after Ctrl-C.
 /// \param call  takes a CancelToken& or nothing; it must not use objects of Python
 template <class Call>
 auto interruptible(const Call& call) {
