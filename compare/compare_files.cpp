@@ -393,8 +393,10 @@ class Comparison {
       return;
     }
     CheckedGrid grid{.name = both.a().uniqueName, .candidateName = both.b().uniqueName};
+    constexpr double kExact = std::numeric_limits<double>::infinity();
     VolumeMetrics exact;
-    exact.psnrBox = exact.psnrActive = std::numeric_limits<double>::infinity();
+    exact.psnrBox = exact.psnrActive = kExact;
+    exact.transmittance = {0.0, kExact, kExact, kExact};
     if (ssim_) exact.ssim = 1.0;
     grid.figures = figuresOf(exact);
     const auto distance = std::size_t(FigureId::kMeshDistance);
@@ -421,8 +423,12 @@ class Comparison {
     const VolumeGrid b = candidate_.read(*pair.candidate);
     CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
     requireOverlap(a.volume, b.volume, name, record);
-    grid.metrics = compareVolumes(a.volume, b.volume,
-                                  {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
+    grid.metrics =
+        compareVolumes(a.volume, b.volume,
+                       {.box = options_.box,
+                        .peak = options_.peak,
+                        .ssim = ssim_,
+                        .transmittance = isLookedThrough(a.descriptor.gridClass, a.volume)});
     grid.figures = figuresOf(grid.metrics);
     addMeshDistance(grid, a, b);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <string_view>
 
 #include "programs/messages.h"
 
@@ -22,6 +23,31 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
      "min-psnr",
      "PSNR box",
      "smallest PSNR over the box, dB",
+     true,
+     false,
+     {.absolute = 0.05}},
+    {FigureId::kPsnrT90,
+     "psnr_t90",
+     "min-psnr-t90",
+     "PSNR T 0.9",
+     "of grids that are looked through: smallest PSNR of the transmittance, where the median "
+     "column lets 90 % of the light through, dB",
+     true,
+     false,
+     {.absolute = 0.05}},
+    {FigureId::kPsnrT50,
+     "psnr_t50",
+     "min-psnr-t50",
+     "PSNR T 0.5",
+     "the same where it lets 50 % of the light through, dB",
+     true,
+     false,
+     {.absolute = 0.05}},
+    {FigureId::kPsnrT10,
+     "psnr_t10",
+     "min-psnr-t10",
+     "PSNR T 0.1",
+     "the same where it lets 10 % of the light through, dB",
      true,
      false,
      {.absolute = 0.05}},
@@ -84,10 +110,7 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
      {.absolute = 0.01}},
 }};
 
-bool isPsnr(const Figure& figure) {
-  return figure.id == FigureId::kPsnrBox || figure.id == FigureId::kPsnrActive ||
-         figure.id == FigureId::kPsnrTemporal;
-}
+bool isPsnr(const Figure& figure) { return std::string_view(figure.key).starts_with("psnr_"); }
 
 }  // namespace
 
@@ -107,6 +130,11 @@ FigureValues figuresOf(const VolumeMetrics& m) {
   };
   set(FigureId::kPsnrBox, m.psnrBox);
   set(FigureId::kPsnrActive, m.psnrActive);
+  if (m.transmittance) {
+    set(FigureId::kPsnrT90, m.transmittance->psnr90);
+    set(FigureId::kPsnrT50, m.transmittance->psnr50);
+    set(FigureId::kPsnrT10, m.transmittance->psnr10);
+  }
   set(FigureId::kMaxError, m.maxError);
   set(FigureId::kP999Error, m.p999Error);
   set(FigureId::kIou, m.iou);

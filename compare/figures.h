@@ -13,6 +13,9 @@ namespace esvr::compare {
 enum class FigureId {
   kPsnrBox,
   kPsnrActive,
+  kPsnrT90,
+  kPsnrT50,
+  kPsnrT10,
   kPsnrTemporal,
   kMaxError,
   kP999Error,
@@ -21,7 +24,7 @@ enum class FigureId {
   kMassError,
   kMeshDistance
 };
-inline constexpr std::size_t kFigureCount = 9;
+inline constexpr std::size_t kFigureCount = 12;
 
 /// The default tolerance of a figure against a baseline.
 struct Slack {

@@ -69,6 +69,12 @@ Cell ratio(const TableRow& row, const TableRecord& record) {
   return double(*record.halfBlosc) / double(*row.bytes);
 }
 
+template <auto Member>
+Cell light(const TableRow& row, const TableRecord&) {
+  if (!row.metrics || !row.metrics->transmittance) return {};
+  return (*row.metrics->transmittance).*Member;
+}
+
 Cell ssim(const TableRow& row, const TableRecord&) {
   return row.metrics ? report::cellOf(row.metrics->ssim) : Cell();
 }
@@ -116,6 +122,18 @@ const std::vector<TableColumn>& tableColumns() {
        kMore},
       {{"psnr_box", "PSNR box", Kind::kDecibels, "PSNR over the box, dB"},
        metric<&M::psnrBox>,
+       kMore},
+      {{"psnr_t90", "T 0.9", Kind::kDecibels,
+        "PSNR of the transmittance, where the median column lets 90 % of the light through, dB"},
+       light<&TransmittancePsnr::psnr90>,
+       kMore},
+      {{"psnr_t50", "T 0.5", Kind::kDecibels,
+        "PSNR of the transmittance, where the median column lets 50 % of the light through, dB"},
+       light<&TransmittancePsnr::psnr50>,
+       kMore},
+      {{"psnr_t10", "T 0.1", Kind::kDecibels,
+        "PSNR of the transmittance, where the median column lets 10 % of the light through, dB"},
+       light<&TransmittancePsnr::psnr10>,
        kMore},
       {{"max_error", "max err", Kind::kError, "largest error of a voxel, value units"},
        metric<&M::maxError>,

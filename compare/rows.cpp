@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "compare/options.h"
-#include "esvr/compact.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/fit.h"
 #include "esvr/grid.h"
@@ -275,7 +275,11 @@ RowMaker::RowMaker(const TableScene& scene)
 
 VolumeMetrics RowMaker::compare(const SparseVolume& volume) const {
   return compareVolumes(scene_.reference.volume, volume,
-                        {.box = scene_.box, .peak = scene_.peak, .ssim = true});
+                        {.box = scene_.box,
+                         .peak = scene_.peak,
+                         .ssim = true,
+                         .transmittance = isLookedThrough(scene_.reference.descriptor.gridClass,
+                                                          scene_.reference.volume)});
 }
 
 void RowMaker::measurePictures(Renderer& renderer, TableRow& row) const {

@@ -14,7 +14,7 @@
 #include "compare/table.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 
 namespace esvr::compare {
 

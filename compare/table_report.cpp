@@ -29,9 +29,9 @@ using report::Html;
 
 namespace {
 
-const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",      "psnr_box",
-                                        "psnr_active", "max_error", "p999_error", "ssim",
-                                        "iou",         "mass_error"};
+const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",     "psnr_box",
+                                        "psnr_active", "psnr_t50",  "max_error", "p999_error",
+                                        "ssim",        "mass_error"};
 const std::vector<std::string> kCost{"name",     "encode_s",     "encode_min_s", "encode_max_s",
                                      "decode_s", "decode_min_s", "decode_max_s", "memory_bytes"};
 const std::vector<std::string> kLooks{"name",  "image_psnr", "image_ssim",  "flip",
@@ -196,9 +196,9 @@ namespace {
 
 /// Columns whose figures are folded below their row.
 const std::vector<std::string> kFolded{
-    "group",        "setting",      "p999_error",   "mass_error",   "encode_min_s",
-    "encode_max_s", "decode_min_s", "decode_max_s", "memory_bytes", "image_ssim",
-    "device_bytes", "note",         "command"};
+    "group",        "setting",      "psnr_t90",     "psnr_t10",     "p999_error",
+    "mass_error",   "encode_min_s", "encode_max_s", "decode_min_s", "decode_max_s",
+    "memory_bytes", "image_ssim",   "device_bytes", "note",         "command"};
 
 constexpr const char* kTableCaption =
     "Ratios are to the half-float Blosc VDB. Errors are in value units. The best figures of a "

@@ -16,8 +16,8 @@
 #include <variant>
 #include <vector>
 
-#include "esvr/compact.h"
 #include "esvr/container.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/metrics.h"
@@ -85,12 +85,16 @@ struct ComparedFiles {
 VolumeMetrics compare(const ComparedFiles& files, const ComparedGrid& grid) {
   const Options& options = files.options;
   const auto read = [&](const auto& path, std::size_t place) {
-    return readGrid(path, place, readingOf(options)).volume;
+    return readGrid(path, place, readingOf(options));
   };
-  const SparseVolume reference = read(*options.reference, grid.reference);
+  const VolumeGrid reference = read(*options.reference, grid.reference);
   const SparseVolume written =
-      files.isEmpty(grid) ? SparseVolume{} : read(options.output, grid.written);
-  return compareVolumes(reference, written, {.box = options.box, .ssim = true});
+      files.isEmpty(grid) ? SparseVolume{} : read(options.output, grid.written).volume;
+  return compareVolumes(
+      reference.volume, written,
+      {.box = options.box,
+       .ssim = true,
+       .transmittance = isLookedThrough(reference.descriptor.gridClass, reference.volume)});
 }
 
 VectorMetrics compareVectorGrid(const ComparedFiles& files, const ComparedGrid& grid) {
@@ -108,6 +112,7 @@ std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
   return {name,
           cli::decibels(m.psnrActive),
           cli::decibels(m.psnrBox),
+          m.transmittance ? cli::decibels(m.transmittance->psnr50) : "-",
           cli::shortNumber(m.maxError),
           cli::shortNumber(m.p999Error),
           cli::shortNumber(*m.ssim),
@@ -129,8 +134,8 @@ void addRows(const ComparedFiles& files, const ComparedGrid& grid, cli::Table& t
 /// \throws BadInput, MemoryExceeded  as for readGrid
 void printErrors(const Options& options, const std::vector<ComparedGrid>& grids,
                  std::ostream& out) {
-  cli::Table table({"grid", "PSNR active", "PSNR box", "max error", "p99.9 error", "SSIM", "IoU",
-                    "mass ref", "mass"});
+  cli::Table table({"grid", "PSNR active", "PSNR box", "PSNR T 0.5", "max error", "p99.9 error",
+                    "SSIM", "IoU", "mass ref", "mass"});
   const ComparedFiles files{options, inspectVdb(options.output)};
   for (const auto& grid : grids) addRows(files, grid, table);
   table.print(out);

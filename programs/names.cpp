@@ -27,8 +27,6 @@ std::string nameOf(TopologyKind kind) {
       return "bricks";
     case TopologyKind::kMask:
       return "mask";
-    case TopologyKind::kBlocks:
-      return "blocks";
     case TopologyKind::kThreshold:
       break;
   }
@@ -37,10 +35,7 @@ std::string nameOf(TopologyKind kind) {
 
 std::string activityOf(const StoredGrid& grid) {
   if (grid.topology == TopologyKind::kMask) return "a mask";
-  if (grid.topology != TopologyKind::kBlocks)
-    return "threshold " + shortNumber(grid.activeThreshold);
-  return "thresholds of blocks around " +
-         shortNumber(thresholdAt(grid.activeThreshold, kMiddleLevel));
+  return "threshold " + shortNumber(grid.activeThreshold);
 }
 
 std::string valuesOf(const GridSummary& grid) {

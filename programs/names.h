@@ -19,11 +19,10 @@ namespace esvr::cli {
 [[nodiscard]] std::string nameOf(ValueType type);
 /// "continuous" or "paper".
 [[nodiscard]] std::string nameOf(KernelForm form);
-/// "threshold", "bricks", "mask" or "blocks".
+/// "threshold", "bricks" or "mask".
 [[nodiscard]] std::string nameOf(TopologyKind kind);
 
-/// How the active voxels of a grid of ellipsoids are found: "threshold 0.01", "a mask", "thresholds of
-/// blocks around 0.01".
+/// How the active voxels of a grid of ellipsoids are found: "threshold 0.01" or "a mask".
 [[nodiscard]] std::string activityOf(const StoredGrid& grid);
 
 /// The type of the values of a grid of a .vdb file: "int32", "vec3s as half".

@@ -70,6 +70,7 @@ void readPart(const std::string& part, LookText& text, FurtherGrid& grid) {
 Look lookOf(const LookText& text, const std::string& usualColors) {
   Look look;
   look.transfer = transferOf(text, usualColors);
+  look.hasOpacity = text.tf || text.opacity;
   readRange(text.range, look);
   return look;
 }
@@ -98,19 +99,23 @@ ValueRange rangeOf(const Look& look, const Scene& scene) {
   return {std::min(scene.data.min, scene.background), std::max(scene.data.max, scene.background)};
 }
 
-/// The transfer function over its range. A level set is drawn as an opaque body unless an option
-/// asks for another function or range.
+LookBasis basisOf(const Scene& scene) {
+  return {scene.data, scene.background, scene.isLevelSet, scene.medianDepth};
+}
+
+/// The transfer function over its range: the usual look, or what options ask for. Light passes
+/// through a composite only, so that other modes have a linear opacity.
 /// \param usualColors  color map without an option
 TransferFunction transferOf(const Look& look, const Scene& scene, RenderMode mode,
                             const char* usualColors) {
-  const bool usual = !look.transfer && look.rangeKind == RangeKind::kAuto;
-  const bool composite = mode == RenderMode::kComposite;
-  if (usual && composite && scene.isLevelSet && scene.background > 0.0f)
-    return levelSetSurface(double(scene.background));
+  const bool usual = look.rangeKind == RangeKind::kAuto && mode == RenderMode::kComposite;
+  if (usual && !look.transfer) return usualLook(basisOf(scene), usualColors);
   const TransferFunction function = look.transfer.value_or(
       TransferFunction{builtInColorMap(usualColors), builtInOpacity(kUsualOpacity)});
   if (look.rangeKind == RangeKind::kOwn) return function;
-  return rescaled(function, rangeOf(look, scene));
+  TransferFunction over = rescaled(function, rangeOf(look, scene));
+  if (usual && !look.hasOpacity) over.opacity = usualOpacity(basisOf(scene));
+  return over;
 }
 
 TransferFunction transferOf(const Options& options, const Scene& scene) {

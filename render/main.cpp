@@ -360,10 +360,10 @@ class InputFrames {
     if (reader_) return scenesOf(reader_->read(frame), file_);
     return place(frame) ? readFrame(file_) : std::nullopt;
   }
-  /// The same without their content.
-  std::optional<std::vector<Scene>> outlines(cli::FrameNumber frame) {
-    if (reader_) return outlinesOf(reader_->read(frame), file_);
-    return place(frame) ? readFrameOutlines(file_) : std::nullopt;
+  /// The same without their content. \param measures  as for outlinesOf
+  std::optional<std::vector<Scene>> outlines(cli::FrameNumber frame, bool measures) {
+    if (reader_) return outlinesOf(reader_->read(frame), file_, measures);
+    return place(frame) ? readFrameOutlines(file_, measures) : std::nullopt;
   }
 
  private:
@@ -390,7 +390,7 @@ class InputFrames {
 std::vector<Scene> scenesOfAll(const Options& options, InputFrames& input) {
   std::optional<std::vector<Scene>> all;
   for (const cli::FrameNumber frame : *options.frames) {
-    auto scenes = input.outlines(frame);
+    auto scenes = input.outlines(frame, !all);
     if (scenes && all) enclose(*scenes, *all);
     if (!all) all = std::move(scenes);
   }

@@ -490,7 +490,8 @@ void addTransferOptions(cli::po::options_description& options) {
      "color map, see the notes (default: viridis; without this option, --opacity, --tf and --range, "
      "a level set is drawn as an opaque body)")
     ("opacity", value<std::string>()->value_name("CURVE"),
-     "opacity curve, see the notes (default: linear)")
+     "opacity curve, see the notes (default: linear, and higher for the small values of a fog "
+     "volume whose largest ones are far above the others)")
     ("tf", value<std::string>()->value_name("FILE"),
      "read colors and opacities from a ParaView preset, in JSON or in the older XML; --opacity "
      "replaces the opacities of the file")

@@ -31,6 +31,7 @@ enum class RangeKind {
 struct Look {
   /// The transfer function before it is rescaled to its range. Default: that of the grid's class.
   std::optional<TransferFunction> transfer;
+  bool hasOpacity = false;  ///< whether the opacities of `transfer` were asked for, not only colors
   RangeKind rangeKind = RangeKind::kAuto;
   ValueRange range;  ///< the range of RangeKind::kGiven
 };

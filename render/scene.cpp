@@ -6,6 +6,7 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
+#include "esvr/transfer_function.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::render {
@@ -76,12 +77,15 @@ Scene propertiesOf(const StoredGrid& grid, const std::string& name) {
 /// because they are exact.
 Scene complete(StoredGrid grid, const std::string& name, const cli::HostMemory& memory) {
   Scene scene = propertiesOf(grid, name);
-  if (grid.voxels)
-    scene.content =
-        VolumeGrid{grid.descriptor,
-                   decodeGrid(grid, {.maxBytes = memory.maxBytes, .memory = memory.voxels}), 0};
-  else
+  if (grid.voxels) {
+    VolumeGrid decoded{grid.descriptor,
+                       decodeGrid(grid, {.maxBytes = memory.maxBytes, .memory = memory.voxels}), 0};
+    scene.medianDepth = lookBasis(decoded.descriptor, decoded.volume).medianDepth;
+    scene.content = std::move(decoded);
+  } else {
+    scene.medianDepth = lookBasis(grid, memory.maxBytes).medianDepth;
     scene.content = grid.field, scene.encoded = std::move(grid);
+  }
   return scene;
 }
 
@@ -218,6 +222,7 @@ class GridsOfVdb {
     if (!scene.box.empty()) scene.data = activeRange(grid.volume);
     scene.background = grid.volume.background;
     scene.isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
+    scene.medianDepth = lookBasis(grid.descriptor, grid.volume).medianDepth;
     scene.content = std::move(grid);
     return scene;
   }
@@ -246,14 +251,19 @@ std::optional<std::vector<Scene>> scenesOf(const EsvrFile& frame, const SceneFil
   });
 }
 
-Scene outlineOf(const StoredGrid& grid, const std::string& name) {
+Scene outlineOf(const StoredGrid& grid, const std::string& name, const SceneFile& file,
+                bool measures) {
   Scene scene = propertiesOf(grid, name);
+  if (measures) scene.medianDepth = lookBasis(grid, file.memory.maxBytes).medianDepth;
   scene.content = Field{};  // its ellipsoids are not drawn
   return scene;
 }
 
-std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame, const SceneFile& file) {
-  return scenesBy(frame, file, outlineOf);
+std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame, const SceneFile& file,
+                                             bool measures) {
+  return scenesBy(frame, file, [&](const StoredGrid& grid, const std::string& name) {
+    return outlineOf(grid, name, file, measures);
+  });
 }
 
 std::optional<std::string> firstDrawable(const std::filesystem::path& path) {
@@ -267,8 +277,8 @@ std::optional<std::vector<Scene>> readFrame(const SceneFile& file) {
                                           : GridsOfVdb(file).frame();
 }
 
-std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file) {
-  if (file.path.extension() == ".esvr") return outlinesOf(contentOf(file), file);
+std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file, bool measures) {
+  if (file.path.extension() == ".esvr") return outlinesOf(contentOf(file), file, measures);
   auto scenes = GridsOfVdb(file).frame();
   if (scenes)
     for (Scene& scene : *scenes) scene.content = VolumeGrid{};
@@ -281,6 +291,7 @@ void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
     if (other.box.empty()) continue;
     scenes[i].box.expand(other.box.min), scenes[i].box.expand(other.box.max);
     scenes[i].data.expand(other.data);
+    if (!scenes[i].medianDepth) scenes[i].medianDepth = other.medianDepth;
   }
 }
 

@@ -25,6 +25,7 @@ struct Scene {
   ValueRange data;  ///< range of the active voxels
   float background = 0.0f;
   bool isLevelSet = false;
+  std::optional<double> medianDepth{};  ///< LookBasis::medianDepth
   std::optional<StoredGrid> encoded{};  ///< stored grid of the field; none for voxels
 };
 
@@ -55,20 +56,24 @@ struct SceneFile {
 [[nodiscard]] std::optional<std::vector<Scene>> readFrame(const SceneFile& file);
 
 /// The same without voxels and ellipsoids, as outlinesOf.
-[[nodiscard]] std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file);
+[[nodiscard]] std::optional<std::vector<Scene>> readFrameOutlines(const SceneFile& file,
+                                                                  bool measures);
 
 /// The name of the first grid of a .vdb or .nvdb file that can be drawn; nothing if there is none.
 [[nodiscard]] std::optional<std::string> firstDrawable(const std::filesystem::path& path);
 
 /// The same as scenesOf without the voxels that the grids may store, which is enough for a camera
 /// and transfer functions.
+/// \param measures  whether Scene::medianDepth is found, for which stored voxels are decoded
 [[nodiscard]] std::optional<std::vector<Scene>> outlinesOf(const EsvrFile& frame,
-                                                           const SceneFile& file);
+                                                           const SceneFile& file, bool measures);
 
 /// The same for one of EsvrFile::grids. \param name  by which users find it
-[[nodiscard]] Scene outlineOf(const StoredGrid& grid, const std::string& name);
+[[nodiscard]] Scene outlineOf(const StoredGrid& grid, const std::string& name,
+                              const SceneFile& file, bool measures);
 
-/// Widens scenes, so that their boxes and their ranges of values enclose those of others.
+/// Widens scenes, so that their boxes and their ranges of values enclose those of others. They keep
+/// their median depth if they have one, so that it is that of the first frame.
 void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes);
 
 struct DrawSettings {

@@ -1,7 +1,7 @@
 // What `vdb2esvr --help` says, and the options that the program has.
 #include "vdb2esvr/options.h"
 
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "programs/command_line.h"
 #include "programs/memory.h"
 #include "programs/messages.h"
@@ -58,12 +58,13 @@ cli::ProgramText programText() {
           "of a .nvdb file cannot be carried; a file with one that cannot be fitted either is "
           "refused, unless --skip names it.\n"
           "\n"
-          "Without a goal, a grid of more than 33 million voxels in bricks gets a single fit. With "
-          "--size and --ratio, several grids share the bytes in proportion to their active voxels, "
+          "--effort says how long a conversion may take. A step below 5 halves the fits; a step "
+          "above it makes them half as long again. On the CPU, fits of large grids are shorter; "
+          "where they would be too short, voxels are stored, and the summary says so. With --size "
+          "and --ratio, several grids share the bytes in proportion to their active voxels, "
           "after each got a few hundred, and the bytes of carried grids count. A frame of a "
           "sequence without active voxels has no size. With --psnr, --count limits the number of "
           "ellipsoids. The program makes only a short fit if that shows that voxels are better. "
-          "Grids of more than 33 million voxels are stored as ellipsoids or exact voxels. "
           "--representation prescribes one of them.\n"
           "\n"
           "With --count, --seconds or --iterations there is a single fit. Its ellipsoids are "
@@ -132,10 +133,9 @@ void addGoalOptions(cli::po::options_description& options) {
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("topology", value<std::string>()->value_name("T")->default_value("auto"),
-     "how active voxels are stored. threshold: by their values; exact: by their mask; auto: by "
-     "their values, with one threshold or one for each block of 4^3 voxels, if the overlap with "
-     "those of IN.vdb is then above 0.95, otherwise by a simplified mask with which it is; neither "
-     "takes more than a quarter of --size");
+     "how active voxels are stored. auto: by their values, so that voxels that differ from the "
+     "background by no more than the error may become inactive; their bounding box stays, and level "
+     "sets keep their band; exact: by their mask, which takes more bytes");
   // clang-format on
 }
 
@@ -147,6 +147,8 @@ void addFitOptions(cli::po::options_description& options) {
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
      "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
      "over the active voxels; in a single fit, the count and the iterations that are not given")
+    ("effort", value<std::int64_t>()->value_name("E")->default_value(std::int64_t(kUsualEffort)),
+     "time to take, from 1 (shortest) to 9 (longest)")
     ("box", value<std::string>()->value_name("BOX"),
      "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is measured (default: the bounding box of "
      "the active voxels)")
@@ -209,8 +211,9 @@ cli::CommandLine commandLine() {
   cli::addSequenceOptions(line.options());
   addFitOptions(line.options());
   cli::addHostMemory(line);
-  line.mainOptions({"preset", "size", "ratio", "psnr", "max-error", "lossless", "count", "grid",
-                    "keep", "skip", "force", "report", "frames", "resume", "device", "max-vram"});
+  line.mainOptions({"preset", "effort", "size", "ratio", "psnr", "max-error", "lossless", "count",
+                    "grid", "keep", "skip", "force", "report", "frames", "resume", "device",
+                    "max-vram"});
   line.helpTopic("paper", paperHelp());
   return line;
 }

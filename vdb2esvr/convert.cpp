@@ -151,7 +151,10 @@ VolumeGrid measureValues(const Options& options, const VolumeGrid& source, Conve
   const CommonFitOptions& fit = options.convert.fit;
   VolumeGrid decoded{.descriptor = source.descriptor,
                      .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
-  grid.metrics = compareVolumes(source.volume, decoded.volume, {.box = fit.box, .peak = fit.peak});
+  const bool isLight =
+      !grid.id.component && isLookedThrough(source.descriptor.gridClass, source.volume);
+  grid.metrics = compareVolumes(source.volume, decoded.volume,
+                                {.box = fit.box, .peak = fit.peak, .transmittance = isLight});
   return decoded;
 }
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"

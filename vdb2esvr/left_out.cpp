@@ -121,12 +121,9 @@ class EllipsoidNotes {
 
   void addActivity() {
     if (grid_.stored().topology != TopologyKind::kMask) add("voxel masks", ruleOfActivity());
-    if (grid_.stored().topology != TopologyKind::kBlocks)
-      add("thresholds of blocks", "one rule determines all active voxels");
   }
 
   [[nodiscard]] const char* ruleOfActivity() const {
-    if (!lacks("levels")) return "thresholds of blocks determine the active voxels";
     if (lacks("bricks")) return "a threshold determines the active voxels";
     return "the values determine the active voxels in the stored bricks";
   }

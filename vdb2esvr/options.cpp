@@ -165,15 +165,18 @@ FitOptions fitOptions(const Arguments& a) {
   return fit;
 }
 
+int effort(const Arguments& a) {
+  return *bounded<int>(a, "effort", std::int64_t{kLeastEffort}, std::int64_t{kMostEffort});
+}
+
 Storage storage(const Arguments& a) {
   return cli::choose<Storage>("storage", a.get<std::string>("storage"),
                               {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
 }
 
 Activity activity(const Arguments& a) {
-  return cli::choose<Activity>(
-      "topology", a.get<std::string>("topology"),
-      {{"auto", Activity::kAuto}, {"threshold", Activity::kByValue}, {"exact", Activity::kExact}});
+  return cli::choose<Activity>("topology", a.get<std::string>("topology"),
+                               {{"auto", Activity::kByValue}, {"exact", Activity::kExact}});
 }
 
 StorageOptions storageOptions(const Arguments& a) {
@@ -304,7 +307,6 @@ void readFrames(const Arguments& a, Options& options) {
   if (options.resume && a.get<bool>("force"))
     throw UsageError(
         "--resume keeps the frames that are there, and --force replaces them; choose one");
-  if (auto* goal = std::get_if<PresetGoal>(&options.convert.goal)) goal->steady = true;
 }
 
 }  // namespace
@@ -329,6 +331,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.convert.goal = goalOf(a, options);
   options.grids.lossless = a.get<bool>("lossless");
   options.convert.representation = representation(a);
+  options.convert.effort = effort(a);
   requireRepresentation(a, options);
   readNonFinite(a, options.read);
   readMemory(a, options);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "esvr/container.h"
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "esvr/vdb_io.h"
 #include "programs/command_line.h"
 #include "programs/messages.h"

@@ -78,6 +78,9 @@ void widen(const FrameGrid& grid, GridRange& range) {
   range.highestActive = first ? grid.psnrActive : std::max(range.highestActive, grid.psnrActive);
   range.lowestBox = first ? grid.psnrBox : std::min(range.lowestBox, grid.psnrBox);
   range.highestBox = first ? grid.psnrBox : std::max(range.highestBox, grid.psnrBox);
+  if (!grid.psnrT50) return;
+  range.lowestT50 = std::min(range.lowestT50.value_or(*grid.psnrT50), *grid.psnrT50);
+  range.highestT50 = std::max(range.highestT50.value_or(*grid.psnrT50), *grid.psnrT50);
 }
 
 Error interruption(const SequenceRecord& record) {
@@ -113,9 +116,12 @@ void takeFigures(const RunRecord& run, FrameRecord& frame) {
   const Ratio ratio = ratioOf(run);
   frame.bytesIn = ratio.bytesIn, frame.bytesOut = ratio.bytesOut;
   frame.seconds = run.secondsTotal;
-  for (const ConvertedGrid& grid : run.grids)
-    frame.grids.push_back({grid.uniqueName, grid.stored().field.ellipsoidCount(),
-                           grid.metrics.psnrBox, grid.metrics.psnrActive});
+  for (const ConvertedGrid& grid : run.grids) {
+    const VolumeMetrics& m = grid.metrics;
+    const auto light = m.transmittance ? std::optional(m.transmittance->psnr50) : std::nullopt;
+    frame.grids.push_back(
+        {grid.uniqueName, grid.stored().field.ellipsoidCount(), m.psnrBox, m.psnrActive, light});
+  }
   for (const NotFitted& left : run.carried)
     frame.carried.push_back({left.grid.uniqueName, left.why});
   for (const NotFitted& left : run.skipped)

@@ -93,6 +93,7 @@ struct FrameGrid {
   std::string name;
   std::size_t ellipsoids = 0;
   double psnrBox = 0.0, psnrActive = 0.0;  ///< dB
+  std::optional<double> psnrT50{};         ///< TransmittancePsnr::psnr50
 };
 
 /// A grid of a frame that was not fitted.
@@ -134,12 +135,14 @@ void takeFigures(const RunRecord& run, FrameRecord& frame);
 [[nodiscard]] std::vector<cli::FrameNumber> framesIn(FrameState state,
                                                      const SequenceRecord& record);
 
-/// The range of a grid's PSNR over its frames.
+/// The ranges of a grid's PSNR over its frames.
 struct GridRange {
   std::string name;
   std::size_t frames = 0;
   double lowestActive = 0.0, highestActive = 0.0;  ///< PSNR over the active voxels, dB
   double lowestBox = 0.0, highestBox = 0.0;        ///< PSNR over the box, dB
+  /// TransmittancePsnr::psnr50 of the frames that have it; nothing if none has
+  std::optional<double> lowestT50{}, highestT50{};
 };
 
 /// The ranges of all grids, in the order in which they first occur.

@@ -43,18 +43,7 @@ const char* nameOf(Preset preset) {
   return "standard";
 }
 
-const char* nameOf(Activity activity) {
-  switch (activity) {
-    case Activity::kExact:
-      return "exact";
-    case Activity::kByValue:
-      return "threshold";
-    case Activity::kAuto:
-    case Activity::kNoMask:
-      break;
-  }
-  return "auto";
-}
+const char* nameOf(Activity activity) { return activity == Activity::kExact ? "exact" : "auto"; }
 
 const char* nameOf(Representation representation) {
   switch (representation) {
@@ -111,6 +100,7 @@ Json askedJson(const Options& options) {
           {"iterations", orNull(fit.iterations)},
           {"method", options.paper ? "paper" : "default"},
           {"preset", nameOf(fit.preset)},
+          {"effort", options.convert.effort},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
           {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
           {"topology", nameOf(storage.activity)},
@@ -178,8 +168,7 @@ Json topologyOf(const RunRecord& record, std::size_t g) {
   return {{"kind", grid.voxels ? "voxels" : cli::nameOf(grid.topology)},
           {"threshold", byThreshold ? Json(grid.activeThreshold) : Json(nullptr)},
           {"bricks", grid.bricks.size()},
-          {"mask_bytes", bytesOf(record.output, g, "mask")},
-          {"level_bytes", bytesOf(record.output, g, "levels")}};
+          {"mask_bytes", bytesOf(record.output, g, "mask")}};
 }
 
 Json fitOf(const ConvertedGrid& grid) {
@@ -314,6 +303,15 @@ Json metricsJson(const VolumeMetrics& m) {
           {"mass", m.massCandidate}};
 }
 
+/// What is seen of a grid that is looked through; other grids have none.
+Json qualityOf(const VolumeMetrics& m) {
+  if (!m.transmittance) return nullptr;
+  return {{"median_depth", m.transmittance->medianDepth},
+          {"psnr_t90", m.transmittance->psnr90},
+          {"psnr_t50", m.transmittance->psnr50},
+          {"psnr_t10", m.transmittance->psnr10}};
+}
+
 Json secondsJson(const PhaseSeconds& s) {
   return {{"read", s.read},
           {"seed", s.seed},
@@ -340,6 +338,7 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"representation", choiceOf(grid)},
           {"layers", layersOf(grid.stored())},
           {"metrics", metricsJson(grid.metrics)},
+          {"quality", qualityOf(grid.metrics)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsJson(grid.seconds)},
           {"left_out", leftOutOf(record, g)},
@@ -529,7 +528,9 @@ Json rangesOf(const SequenceRecord& record) {
     grids.push_back({{"name", range.name},
                      {"frames", range.frames},
                      {"psnr_active", {range.lowestActive, range.highestActive}},
-                     {"psnr_box", {range.lowestBox, range.highestBox}}});
+                     {"psnr_box", {range.lowestBox, range.highestBox}},
+                     {"psnr_t50", range.lowestT50 ? Json{*range.lowestT50, *range.highestT50}
+                                                  : Json(nullptr)}});
   return grids;
 }
 

@@ -11,6 +11,7 @@
 #include <optional>
 #include <system_error>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "esvr/device.h"
@@ -169,8 +170,8 @@ void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log&
              cli::shortNumber(grid.metrics.iou));
 }
 
-/// Converts one grid after the other until all are done or the run is interrupted. Grids with the
-/// same voxels are converted once.
+/// Converts the grids until all are done or the run is interrupted: small ones at the same time, and then
+/// one after the other. Grids with the same voxels are converted once.
 class FileConversion {
  public:
   FileConversion(const Options& options, const std::vector<Device>& devices,
@@ -192,9 +193,12 @@ class FileConversion {
            RunRecord& record) {
     const Twins twins = findTwins(options_, grids);
     ByteShares shares(options_, record.input, grids, twins, carried);
+    auto early = convertSmall(grids, twins);
     for (std::size_t g = 0; g < grids.size(); ++g) {
       if (cancelled())
         record.notFitted.push_back(grids[g].uniqueName);
+      else if (early[g])
+        record.grids.push_back(std::move(*early[g]));
       else if (const auto twin = twins.find(g); twin != twins.end())
         record.grids.push_back(twinOf(record.grids[twin->second.of], grids[g], twin->second));
       else if (!convert(g, grids[g], shares, record))
@@ -230,6 +234,37 @@ class FileConversion {
 
   void tellLost(const Device& device, const std::string& why, const std::string& next) const {
     log_.warning(deviceName(device) + " is not used any more: " + why + "; " + next);
+  }
+
+  /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
+  /// keeps few threads and little of a GPU busy.
+  /// \return a conversion for each grid, or nothing for those that are left to convert
+  std::vector<std::optional<ConvertedGrid>> convertSmall(const std::vector<FittedGrid>& grids,
+                                                         const Twins& twins) const {
+    constexpr std::uint64_t kMostActive = std::uint64_t{1} << 19;
+    constexpr int kAtOnce = 4;  // as many frames of a sequence use a GPU
+    std::vector<std::optional<ConvertedGrid>> made(grids.size());
+    // A single fit takes the time that was asked for, and shows its progress.
+    const bool isSingleFit =
+        options_.convert.fit.seconds || std::holds_alternative<FitGoal>(options_.convert.goal);
+    const bool areIndependent = !options_.size && !options_.ratio && !parts_.haveRanks();
+    if (isSingleFit || !areIndependent || grids.size() < 2) return made;
+    std::vector<std::size_t> small;
+    for (std::size_t g = 0; g < grids.size(); ++g)
+      if (!twins.contains(g) && grids[g].source.activeVoxels <= kMostActive) small.push_back(g);
+    const CancelToken& cancel = *options_.convert.fit.cancel;
+    const int workers = std::min(kAtOnce, cli::taskWorkers(options_.threads, small.size()));
+    cli::forEachTask({small.size(), workers, cli::OnFrameError::kStop, cancel}, [&](auto task) {
+      const std::size_t g = small[task.index];
+      const CancelScope scope(&cancel);
+      try {
+        made[g] = convertGrid(options_, grids[g], std::nullopt);
+      } catch (const DeviceError&) {  // it is converted again where another device can take over
+      } catch (const Cancelled&) {
+      }
+      return true;
+    });
+    return made;
   }
 
   /// \return false if the run was interrupted before the fit had a result

@@ -4,7 +4,7 @@
 #include <utility>
 #include <variant>
 
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "programs/run_main.h"
 

@@ -29,6 +29,10 @@ std::string toText(const Candidate& candidate) {
 /// Says which representation was chosen for a grid, and why.
 void printChoice(const ConvertedGrid& grid, std::ostream& out) {
   const auto& choice = grid.conversion.choice;
+  if (grid.conversion.fitsTookTooLong)
+    out << cli::printable(grid.uniqueName)
+        << ": voxels, because fitting ellipsoids would take too long; a higher --effort or "
+           "--representation ellipsoids fits them\n";
   if (!choice || !choice->voxels || !choice->ellipsoids) return;
   const bool voxels = grid.stored().voxels.has_value();
   const Candidate& taken = voxels ? *choice->voxels : *choice->ellipsoids;
@@ -41,29 +45,12 @@ void printChoice(const ConvertedGrid& grid, std::ostream& out) {
   out << '\n';
 }
 
-/// Says that the overlap of active voxels was given up for a size or for the memory.
-void printOverlap(const Options& options, const ConvertedGrid& grid, std::ostream& out) {
-  const bool isBand = grid.stored().topology == TopologyKind::kBricks;
-  if (options.convert.storage.activity != Activity::kAuto || isBand) return;
-  if (grid.metrics.iou > kMinOverlap) return;
-  out << cli::printable(grid.uniqueName)
-      << ": a mask of active voxels would take too much of the size or of the memory; their "
-         "overlap is "
-      << cli::shortNumber(grid.metrics.iou) << '\n';
-}
-
-/// Says what the mask of active voxels or the thresholds of blocks take, if there are any.
+/// Says what the mask of active voxels takes, if there is one.
 void printTopology(const RunRecord& record, std::size_t g, std::ostream& out) {
   const ConvertedGrid& grid = record.grids[g];
-  const TopologyKind kind = grid.stored().topology;
-  const bool isMask = kind == TopologyKind::kMask;
-  if (grid.stored().voxels || !(isMask || kind == TopologyKind::kBlocks)) return;
-  out << cli::printable(grid.uniqueName) << ": "
-      << (!isMask                  ? "thresholds of blocks take "
-          : grid.metrics.iou < 1.0 ? "a simplified mask of active voxels takes "
-                                   : "the mask of active voxels takes ")
-      << bytesOf(record.output, g, isMask ? "mask" : "levels") << " bytes, with an overlap of "
-      << cli::shortNumber(grid.metrics.iou) << '\n';
+  if (grid.stored().voxels || grid.stored().topology != TopologyKind::kMask) return;
+  out << cli::printable(grid.uniqueName) << ": the mask of active voxels takes "
+      << bytesOf(record.output, g, "mask") << " bytes\n";
 }
 
 /// Says that ellipsoids, on which the user insisted, take more bytes than exact voxels.
@@ -121,23 +108,22 @@ void printShared(const RunRecord& record, std::ostream& out) {
         << " times)\n";
 }
 
-void printFitted(const Options& options, const RunRecord& record, std::ostream& out) {
+void printFitted(const RunRecord& record, std::ostream& out) {
   if (record.grids.empty()) return;
-  cli::Table table(
-      {"grid", "ellipsoids", "bytes", "PSNR active", "PSNR box", "max error", "seconds"});
+  cli::Table table({"grid", "ellipsoids", "bytes", "PSNR active", "PSNR box", "PSNR T 0.5",
+                    "max error", "seconds"});
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
     const ConvertedGrid& grid = record.grids[g];
+    const auto& light = grid.metrics.transmittance;
     table.add({grid.uniqueName, std::to_string(grid.stored().field.ellipsoidCount()),
                std::to_string(cli::ownBytes(record.output, g)),
                cli::decibels(grid.metrics.psnrActive), cli::decibels(grid.metrics.psnrBox),
-               cli::shortNumber(grid.metrics.maxError), cli::seconds(grid.seconds.total())});
+               light ? cli::decibels(light->psnr50) : "-", cli::shortNumber(grid.metrics.maxError),
+               cli::seconds(grid.seconds.total())});
   }
   table.print(out);
   for (std::size_t g = 0; g < record.grids.size(); ++g) {
-    if (!record.grids[g].twinOf) {
-      printTopology(record, g, out);
-      printOverlap(options, record.grids[g], out);
-    }
+    if (!record.grids[g].twinOf) printTopology(record, g, out);
     printInactive(record, record.grids[g], out);
     printNote(record.grids[g], out);
   }
@@ -177,7 +163,7 @@ void printNotFitted(const RunRecord& record, std::ostream& out) {
 }  // namespace
 
 void printSummary(const Options& options, const RunRecord& record, std::ostream& out) {
-  printFitted(options, record, out);
+  printFitted(record, out);
   printVectors(record, out);
   printNotFitted(record, out);
   printShared(record, out);
@@ -208,10 +194,18 @@ std::string lowest(const FrameRecord& frame, double FrameGrid::*psnr) {
   return cli::decibels(least);
 }
 
+/// The same of the PSNR of transmittance, which only grids that are looked through have.
+std::string lowestT50(const FrameRecord& frame) {
+  std::optional<double> least;
+  for (const FrameGrid& grid : frame.grids)
+    if (grid.psnrT50) least = std::min(least.value_or(*grid.psnrT50), *grid.psnrT50);
+  return least ? cli::decibels(*least) : "-";
+}
+
 std::vector<std::string> rowOf(const SequenceRecord& record, const FrameRecord& frame) {
   const std::string number = std::to_string(frame.frame.number);
   const std::string state = stateOf(record, frame);
-  if (!hasFigures(frame)) return {number, "-", "-", "-", "-", "-", "-", "-", state};
+  if (!hasFigures(frame)) return {number, "-", "-", "-", "-", "-", "-", "-", "-", state};
   std::size_t ellipsoids = 0;
   for (const FrameGrid& grid : frame.grids) ellipsoids += grid.ellipsoids;
   return {number,
@@ -221,6 +215,7 @@ std::vector<std::string> rowOf(const SequenceRecord& record, const FrameRecord& 
           std::to_string(frame.bytesOut),
           lowest(frame, &FrameGrid::psnrActive),
           lowest(frame, &FrameGrid::psnrBox),
+          lowestT50(frame),
           cli::seconds(frame.seconds),
           state};
 }
@@ -291,7 +286,7 @@ void printBytes(const Options& options, const SequenceRecord& record, std::ostre
 
 void printSequence(const Options& options, const SequenceRecord& record, std::ostream& out) {
   cli::Table table({"frame", "fitted", "carried", "ellipsoids", "bytes", "PSNR active", "PSNR box",
-                    "seconds", "state"});
+                    "PSNR T 0.5", "seconds", "state"});
   for (const FrameRecord& frame : record.frames) table.add(rowOf(record, frame));
   table.print(out);
   printRanges(record, out);

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <utility>
 
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "programs/run_main.h"
 #include "vdb2esvr/convert.h"
 

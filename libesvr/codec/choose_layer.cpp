@@ -127,8 +127,7 @@ VoxelLayer exactLayer(const SparseVolume& volume) {
 
 namespace {
 
-constexpr double kErrorOfBound = 0.577;  // error of rounding: 1 / sqrt(3) of the bound
-constexpr double kMargin = 1.0 - 1e-6;   // factor of a bound, which leaves room for rounding
+constexpr double kMargin = 1.0 - 1e-6;  // factor of a bound, which leaves room for rounding
 
 double largestMagnitude(const SparseVolume& volume) {
   double largest = 0.0;
@@ -208,14 +207,13 @@ void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& ma
   });
 }
 
-/// The simplified mask and those of the volume's active voxels that differ.
-std::vector<BrickMask> withDiffering(const SparseVolume& volume, std::span<const BrickMask> mask,
-                                     const std::vector<BrickMask>& differing) {
-  std::vector<BrickMask> masks(mask.begin(), mask.end());
-  for (std::size_t b = 0; b < masks.size(); ++b)
-    for (std::size_t w = 0; w < masks[b].words.size(); ++w)
-      masks[b].words[w] |= volume.active[b].words[w] & differing[b].words[w];
-  return masks;
+/// Makes a voxel of each face of the active box active that would lose all of its active voxels.
+void keepBox(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
+  const unsigned lost = kAllFaces & ~touchedFaces(volume, box, masks);
+  for (const Coord voxel : boxVoxels(volume, box, lost)) {
+    const auto b = findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
+    masks[*b].set(voxelOffset(localOf(voxel)));
+  }
 }
 
 /// Gives a layer these active voxels. Of the others, those that do not differ from the background
@@ -235,24 +233,19 @@ void activate(const SparseVolume& volume, const std::vector<BrickMask>& active,
   dropVacant(layer);
 }
 
-void activateByValue(const SparseVolume& volume, double bound, Activity activity,
-                     const SimplifiedMasks* simplified, VoxelLayer& layer) {
+void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
   const auto differs = differing(volume, bound);
   auto active = differs;
-  clip(volume, activeBox(volume), active);
-  if (activity == Activity::kAuto && !overlapOf(volume.active, active).suffices()) {
-    const SimplifiedMasks own(volume);
-    const auto mask = (simplified ? *simplified : own).forError(kErrorOfBound * bound);
-    active = withDiffering(volume, mask, differs);
-  }
+  const Box box = activeBox(volume);
+  clip(volume, box, active);
+  keepBox(volume, box, active);
   activate(volume, active, differs, layer);
 }
 
 }  // namespace
 
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
-                        RoundedSigns signs, const SimplifiedMasks* simplified,
-                        DecodedValues decoded) {
+                        RoundedSigns signs, DecodedValues decoded) {
   if (!(std::isfinite(bound) && bound > 0.0))
     throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
   const bool halfs = decoded == DecodedValues::kHalfs;
@@ -268,8 +261,7 @@ VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activ
   for (const double h : halfSteps) {
     if (!(h > 0.0)) break;
     VoxelLayer layer = quantised(volume, h, signs);
-    if (activity != Activity::kExact)
-      activateByValue(volume, side * bound, activity, simplified, layer);
+    if (activity == Activity::kByValue) activateByValue(volume, side * bound, layer);
     SparseVolume made = volumeOf(layer);
     if (halfs) roundToHalfs(made);
     if (largestDifference(volume, made) <= bound) return layer;

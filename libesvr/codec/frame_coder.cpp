@@ -222,8 +222,7 @@ class FrameCoder {
     codeMotion(side, b);
     past_.fill(layer_.bricks[b], motion_, cube_);
     if (codeCopy(side, b)) return;
-    halo_.fill(layer_, index_, b, vacantCode_);
-    fillErrors(b);
+    fillBefore(b);
     if (thrift_) setTargets(b);
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (v % kVoxelsPerSolution == 0) predictor_.solve();
@@ -283,10 +282,16 @@ class FrameCoder {
     }
   }
 
-  void fillErrors(std::size_t b) {
-    Halo::forEachBefore(layer_, index_, b, [&](std::size_t cell, std::uint32_t neighbour, int v) {
+  /// Sets what is known of the voxels before brick b.
+  void fillBefore(std::size_t b) {
+    const Halo::Before before = Halo::bricksBefore(layer_, index_, b);
+    halo_.fillCodes(layer_, before, vacantCode_);
+    Halo::forEachLine(before, [&](std::size_t cell, std::uint32_t neighbour, int v, int count) {
       const bool there = neighbour != BrickIndex::kNone;
-      error_[cell] = there ? errors_[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)] : 0;
+      for (int n = 0; n < count; ++n, ++cell, ++v) {
+        isActive_[cell] = there && layer_.active[neighbour].test(v);
+        error_[cell] = there ? errors_[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)] : 0;
+      }
     });
   }
 
@@ -331,14 +336,14 @@ class FrameCoder {
     if (vacant) layer_.vacant[b].set(v);
     code = vacant ? vacantCode_ : codeDistance(side, code);
     halo_.code[cell] = code;
-    halo_.active[cell] = active;
+    isActive_[cell] = active;
     error_[cell] = errors_[at_] = predictor_.learn(code);
   }
 
   bool codeActive(Side& side, std::size_t cell, std::size_t pastCell, bool active) {
-    const std::size_t around = std::size_t(halo_.active[cell - Halo::kStepX]) +
-                               std::size_t(halo_.active[cell - Halo::kStepY]) +
-                               std::size_t(halo_.active[cell - Halo::kStepZ]);
+    const std::size_t around = std::size_t(isActive_[cell - Halo::kStepX]) +
+                               std::size_t(isActive_[cell - Halo::kStepY]) +
+                               std::size_t(isActive_[cell - Halo::kStepZ]);
     const std::size_t far = predictor_.distanceFrom(vacantCode_);
     return side.bit(active_[far][around][cube_.active[pastCell]], active);
   }
@@ -422,6 +427,7 @@ class FrameCoder {
   FramePredictor predictor_;
   std::vector<std::uint8_t> errors_;                ///< by voxel
   std::array<std::uint8_t, Halo::kCells> error_{};  ///< those of the halo
+  std::array<bool, Halo::kCells> isActive_{};       ///< activities of the halo
   std::int32_t vacantCode_;
   const FrameThrift* thrift_;
   std::array<double, kBrickVoxels> target_{};  ///< values that codes of the brick are to be near

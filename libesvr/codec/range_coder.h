@@ -1,5 +1,6 @@
 #pragma once
-/// The entropy coder of all sections: an adaptive binary range coder, and the models of numbers on top of it.
+/// The entropy coder of all sections but voxels (codec/symbol_coder.h): an adaptive binary range coder, and the models of
+/// numbers on top of it.
 ///
 /// Each decision has a model that learns its probability. Only integers are used, so that every machine reads the
 /// same (docs/format.md, "The range coder"). Coders of numbers, bricks and voxels are written once for both

@@ -1,18 +1,18 @@
 #pragma once
-/// Codes the voxels of a layer's bricks with range coders (docs/format.md, "Voxels").
+/// Codes the voxels of a layer's bricks with coders of symbols (docs/format.md, "Voxels").
 ///
 /// The bricks are divided into blocks of up to 2^20 voxels. A block has its own stream and its own
 /// models, and no voxel of it is predicted from another block, so that all threads write and read at
 /// the same time. A layer of up to 2^20 voxels in bricks is one block. The number of threads changes
 /// no byte.
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "codec/range_coder.h"
 #include "core/brick_index.h"
 #include "esvr/quantised.h"
 
@@ -25,78 +25,61 @@ struct Halo {
   static constexpr int kCells = kSide * kSide * kSide;
 
   std::array<std::int32_t, kCells> code;
-  std::array<bool, kCells> active;
 
   static int cell(Coord local) {
     return (local.x + 1) * kStepX + (local.y + 1) * kStepY + local.z + 1;
   }
 
-  /// Calls visit(cell) for the cells of the voxels before the brick.
-  template <class Visit>
-  static void forEachBefore(const Visit& visit) {
-    for (int cell = 0; cell < kStepX; ++cell) visit(std::size_t(cell));
-    for (int x = 1; x < kSide; ++x) {
-      for (int z = 0; z < kSide; ++z) visit(std::size_t(x * kStepX + z));
-      for (int y = 1; y < kSide; ++y) visit(std::size_t(x * kStepX + y * kStepY));
-    }
+  /// The bricks before a brick, each with the number 4 x + 2 y + z, where x, y and z are 0 along the axes on which it is
+  /// lower and 1 along the others. BrickIndex::kNone stands for a brick that does not exist.
+  using Before = std::array<std::uint32_t, 7>;
+  /// The numbers of those along x, y and z.
+  static constexpr std::array<std::size_t, 3> kFaces{3, 5, 6};
+
+  [[nodiscard]] static Coord stepTo(std::size_t number) {
+    const auto n = std::int32_t(number);
+    return {(n >> 2 & 1) - 1, (n >> 1 & 1) - 1, (n & 1) - 1};
   }
 
-  /// Copies the voxels that lie before brick b. The voxels of the brick itself are not set here,
-  /// because the coder sets each of them before it is read.
-  /// \param index       finds bricks as BrickIndex::find
-  /// \param vacantCode  code for voxels that no brick has
+  /// \param index  finds bricks as BrickIndex::find
   template <class Index>
-  void fill(const VoxelLayer& layer, const Index& index, std::size_t b, std::int32_t vacantCode) {
-    forEachBefore(layer, index, b, [&](std::size_t at, std::uint32_t neighbour, int v) {
-      const bool there = neighbour != BrickIndex::kNone;
-      code[at] =
-          there ? layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)] : vacantCode;
-      active[at] = there && layer.active[neighbour].test(v);
-    });
+  [[nodiscard]] static Before bricksBefore(const VoxelLayer& layer, const Index& index,
+                                           std::size_t b) {
+    Before before;
+    for (std::size_t n = 0; n < before.size(); ++n)
+      before[n] = index.find(layer.bricks[b] + stepTo(n));
+    return before;
   }
 
-  /// Calls visit(cell, neighbour, offset) for the cells of the voxels that lie before brick b.
-  /// `neighbour` is the brick that has the voxel, or BrickIndex::kNone, and `offset` says where in
-  /// its brick the voxel is.
-  template <class Index, class Visit>
-  static void forEachBefore(const VoxelLayer& layer, const Index& index, std::size_t b,
-                            const Visit& visit) {
-    for (int corner = 0; corner < 7; ++corner) {  // corner 7 is the brick itself
-      const Coord step{(corner >> 2 & 1) - 1, (corner >> 1 & 1) - 1, (corner & 1) - 1};
-      forEachOf(index.find(layer.bricks[b] + step), step, visit);
+  /// Calls visit(cell, neighbour, offset, count) for runs along z of the voxels before a brick. `cell` is the first one,
+  /// `neighbour` the brick that has them, or BrickIndex::kNone, `offset` says where in its brick the first one is, and
+  /// `count` is 8 or 1.
+  template <class Visit>
+  static void forEachLine(const Before& before, const Visit& visit) {
+    for (std::size_t n = 0; n < before.size(); ++n) {
+      const Coord step = stepTo(n);
+      const auto first = [](int s) { return s < 0 ? -1 : 0; };
+      const auto last = [](int s) { return s < 0 ? -1 : kBrickSide - 1; };
+      for (int x = first(step.x); x <= last(step.x); ++x)
+        for (int y = first(step.y); y <= last(step.y); ++y) {
+          const Coord local{x, y, first(step.z)};
+          visit(std::size_t(cell(local)), before[n], voxelOffset(localOf(local)),
+                step.z < 0 ? 1 : kBrickSide);
+        }
     }
   }
 
-  /// The activities of the seven voxels before a voxel, as bits from the highest to the lowest: A,
-  /// B, C (before it along x, y, z), AB, AC, BC, ABC (along two or three axes).
-  [[nodiscard]] std::size_t activityAround(int cell) const {
-    std::size_t bits = 0;
-    for (const int back : {kStepX, kStepY, kStepZ, kStepX + kStepY, kStepX + kStepZ,
-                           kStepY + kStepZ, kStepX + kStepY + kStepZ})
-      bits = bits << 1 | std::size_t(active[std::size_t(cell - back)]);
-    return bits;
-  }
-
-  /// The same for a voxel whose neighbour before it along z has been coded last.
-  /// \param before   the activities around that neighbour
-  /// \param current  whether that neighbour is active
-  [[nodiscard]] std::size_t activityAfter(std::size_t before, bool current, int cell) const {
-    const auto bit = [&](int back) { return std::size_t(active[std::size_t(cell - back)]); };
-    const std::size_t kept = (before >> 4 & 4u) | (before >> 4 & 2u) | (before >> 3 & 1u);
-    return bit(kStepX) << 6 | bit(kStepY) << 5 | std::size_t(current) << 4 |
-           bit(kStepX + kStepY) << 3 | kept;
-  }
-
- private:
-  /// Visits the last slice of a neighbour along every axis on which the step is -1.
-  template <class Visit>
-  static void forEachOf(std::uint32_t neighbour, Coord step, const Visit& visit) {
-    const auto first = [](int s) { return s < 0 ? -1 : 0; };
-    const auto last = [](int s) { return s < 0 ? -1 : kBrickSide - 1; };
-    for (int x = first(step.x); x <= last(step.x); ++x)
-      for (int y = first(step.y); y <= last(step.y); ++y)
-        for (int z = first(step.z); z <= last(step.z); ++z)
-          visit(std::size_t(cell({x, y, z})), neighbour, voxelOffset(localOf({x, y, z})));
+  /// Copies the codes of the voxels before a brick. Those of the brick itself are not set here, because the coder sets
+  /// each of them before it is read.
+  /// \param vacantCode  code for voxels that no brick has
+  void fillCodes(const VoxelLayer& layer, const Before& before, std::int32_t vacantCode) {
+    forEachLine(before, [&](std::size_t at, std::uint32_t neighbour, int v, int count) {
+      if (neighbour == BrickIndex::kNone)
+        std::fill_n(&code[at], count, vacantCode);
+      else
+        std::copy_n(&layer.codes[neighbour * std::size_t(kBrickVoxels) + std::size_t(v)], count,
+                    &code[at]);
+    });
   }
 };
 
@@ -125,16 +108,12 @@ using Stream = std::vector<std::byte>;
 using StreamView = std::span<const std::byte>;
 
 /// Writes the stream of each block.
-/// \param first  the writer of the first block, which may have written something else before
-[[nodiscard]] std::vector<Stream> encodeVoxels(Writer first, const VoxelModel& model,
-                                               const VoxelLayer& layer);
+[[nodiscard]] std::vector<Stream> encodeVoxels(const VoxelModel& model, const VoxelLayer& layer);
 
 /// Reads the codes and masks of a layer whose bricks are set.
-/// \param first   the reader of the first block, which may have read something else before
-/// \param others  the streams of the other blocks, blockCount() - 1 of them
+/// \param streams  the stream of each block, blockCount() of them
 /// \throws BadInput  a code is out of range
-void decodeVoxels(const Reader& first, std::span<const StreamView> others, const VoxelModel& model,
-                  VoxelLayer& layer);
+void decodeVoxels(std::span<const StreamView> streams, const VoxelModel& model, VoxelLayer& layer);
 
 /// What chooseCodes() weighs.
 struct Thrift {

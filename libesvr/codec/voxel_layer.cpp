@@ -136,10 +136,21 @@ void roundToHalfs(SparseVolume& volume) {
 }
 
 bool allFinite(const VoxelLayer& layer) {
-  for (std::size_t i = 0; i < layer.codes.size(); ++i)
-    if (!std::isfinite(codec::valueOfCode(layer, layer.codes[i])) &&
-        !layer.vacant[i / kBrickVoxels].test(int(i % kBrickVoxels)))
-      return false;
+  // Quantised values are limited to floats, and halfs have no infinity here. Most floats need no second look.
+  if (layer.form == VoxelForm::kHalf) return true;
+  if (layer.form == VoxelForm::kQuantised && layer.divisor > 0.0) return true;
+  constexpr std::int32_t kLargest = 0x7f7fffff;
+  const auto isSuspect = [&](std::int32_t code) {
+    return layer.form != VoxelForm::kFloat || code > kLargest || code < -1 - kLargest;
+  };
+  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
+    const std::int32_t* codes = &layer.codes[b * kBrickVoxels];
+    bool suspect = false;
+    for (int v = 0; v < kBrickVoxels; ++v) suspect |= isSuspect(codes[v]);
+    for (int v = 0; suspect && v < kBrickVoxels; ++v)
+      if (!std::isfinite(codec::valueOfCode(layer, codes[v])) && !layer.vacant[b].test(v))
+        return false;
+  }
   return true;
 }
 

@@ -15,9 +15,11 @@
 namespace esvr::codec {
 namespace {
 
-constexpr std::size_t kCommonShare = 512;  // a code is common if 1 of 512 voxels has it
-constexpr std::size_t kSamples = 2048;     // voxels that are compared with their images
-constexpr double kAlike = 0.4;             // share of equal samples above which a mirror is tried
+constexpr std::size_t kCommonShare = 512;   // a code is common if 1 of 512 voxels has it
+constexpr std::size_t kSamples = 2048;      // voxels that are compared with their images
+constexpr double kAlike = 0.4;              // share of equal samples above which a mirror is tried
+constexpr std::size_t kFirstSamples = 128;  // the samples that are compared first, and
+constexpr double kFirstAlike = kAlike / 2.0;  // their share for the others to be compared
 constexpr std::int32_t kMaxExtent = 1 << 14;  // voxels; the search is skipped for larger grids
 
 bool vacantAt(const VoxelLayer& layer, std::size_t i) {
@@ -112,20 +114,36 @@ class MirrorSearch {
   }
 
  private:
-  /// Takes samples evenly among the voxels that are not vacant.
+  /// Takes samples evenly among the voxels that are not vacant. Every 16th one moves to the front, so that the first ones
+  /// are even too.
   void takeSamples() {
     std::size_t voxels = 0, seen = 0;
-    for (std::size_t i = 0; i < layer_.codes.size(); ++i) voxels += vacantAt(layer_, i) ? 0 : 1;
+    for (const BrickMask& vacant : layer_.vacant)
+      voxels += std::size_t(kBrickVoxels - vacant.count());
     const std::size_t every = std::max<std::size_t>(voxels / kSamples, 1);
-    for (std::size_t i = 0; i < layer_.codes.size(); ++i) {
-      if (vacantAt(layer_, i) || seen++ % every != 0) continue;
-      const Coord local = voxelLocal(int(i % kBrickVoxels));
-      samples_.push_back({layer_.bricks[i / kBrickVoxels] * kBrickSide + local, layer_.codes[i]});
-    }
+    for (std::size_t b = 0; b < layer_.bricks.size(); ++b)
+      for (int v = 0; v < kBrickVoxels; ++v) {
+        if (layer_.vacant[b].test(v) || seen++ % every != 0) continue;
+        samples_.push_back({layer_.bricks[b] * kBrickSide + voxelLocal(v),
+                            layer_.codes[b * std::size_t(kBrickVoxels) + std::size_t(v)]});
+      }
+    constexpr std::size_t kStride = kSamples / kFirstSamples;
+    for (std::size_t n = 0; n * kStride < samples_.size(); ++n)
+      std::swap(samples_[n], samples_[n * kStride]);
   }
 
+  /// The number of samples that equal their images; 0 if few of the first ones do.
   [[nodiscard]] std::size_t alike(std::int32_t Coord::*axis, std::int32_t mirror) const {
-    return std::size_t(std::count_if(samples_.begin(), samples_.end(), [&](Sample sample) {
+    const std::span<const Sample> all(samples_);
+    const auto few = all.first(std::min(kFirstSamples, all.size()));
+    const std::size_t equal = countAlike(few, axis, mirror);
+    if (double(equal) <= kFirstAlike * double(few.size())) return 0;
+    return equal + countAlike(all.subspan(few.size()), axis, mirror);
+  }
+
+  [[nodiscard]] std::size_t countAlike(std::span<const Sample> samples, std::int32_t Coord::*axis,
+                                       std::int32_t mirror) const {
+    return std::size_t(std::count_if(samples.begin(), samples.end(), [&](Sample sample) {
       sample.place.*axis = mirror - sample.place.*axis;
       return codeAt(sample.place) == sample.code;
     }));

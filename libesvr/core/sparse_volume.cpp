@@ -160,6 +160,61 @@ Box activeBox(const SparseVolume& volume) {
   });
 }
 
+namespace {
+
+/// Calls visit(b, v, faces) for each voxel v of the mask of brick b that touches a face of the active box.
+template <class Visit>
+void forEachOnFaces(const SparseVolume& volume, const Box& box, std::span<const BrickMask> masks,
+                    Visit visit) {
+  constexpr int kLast = kBrickSide - 1;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const Coord low = volume.brickCorner(b), high = low + Coord{kLast, kLast, kLast};
+    const bool isInside = low.x > box.min.x && low.y > box.min.y && low.z > box.min.z &&
+                          high.x < box.max.x && high.y < box.max.y && high.z < box.max.z;
+    for (int v = 0; v < kBrickVoxels && !isInside; ++v)
+      if (masks[b].test(v))
+        if (const unsigned faces = facesOf(box, low + voxelLocal(v))) visit(b, v, faces);
+  }
+}
+
+}  // namespace
+
+unsigned touchedFaces(const SparseVolume& volume, const Box& box,
+                      std::span<const BrickMask> masks) {
+  unsigned touched = 0;
+  forEachOnFaces(volume, box, masks, [&](std::size_t, int, unsigned faces) { touched |= faces; });
+  return touched;
+}
+
+std::vector<Coord> boxVoxels(const SparseVolume& volume, const Box& box, unsigned faces) {
+  struct Candidate {
+    Coord voxel;
+    double distance = -1.0;  ///< from the background; below 0: there is no voxel
+  };
+  std::array<Candidate, kAllFaces + 1> best;  // of the voxels that touch the same faces
+  forEachOnFaces(volume, box, volume.active, [&](std::size_t b, int v, unsigned own) {
+    const double distance =
+        std::abs(double(volume.brickValues(b)[std::size_t(v)]) - volume.background);
+    if (distance > best[own].distance)
+      best[own] = {volume.brickCorner(b) + voxelLocal(v), distance};
+  });
+  std::vector<Coord> voxels;
+  while (faces != 0) {
+    unsigned found = 0;
+    int most = 0;
+    for (unsigned own = 1; own <= kAllFaces; ++own) {
+      const int count = best[own].distance >= 0.0 ? std::popcount(own & faces) : 0;
+      const bool isBetter = count == most && best[own].distance > best[found].distance;
+      if (count > most || (count > 0 && isBetter)) most = count, found = own;
+    }
+    if (most == 0) break;  // no voxel is active
+    voxels.push_back(best[found].voxel);
+    faces &= ~found;
+  }
+  std::ranges::sort(voxels);
+  return voxels;
+}
+
 ValueRange activeRange(const SparseVolume& volume) {
   const ValueRange range =
       overBricks(volume, ValueRange::none(), [&](std::size_t b, ValueRange& result) {

@@ -1,10 +1,12 @@
 #pragma once
-/// The inner loops over one pair of an ellipsoid and a brick, or of an ellipsoid and places in a brick.
-/// They are compiled once for each
-/// instruction set and chosen at run time. A SIMD vector holds a row of eight voxels along z, and
-/// the loop runs along y. In the line form of an ellipsoid (line_form.h), m then takes one
-/// multiply-add for each row.
+/// The inner loops over one pair of an ellipsoid and a brick, or of an ellipsoid and places in a
+/// brick. They are compiled once for each instruction set and chosen at run time. A SIMD vector holds
+/// one row of eight voxels along z, or two rows that follow each other along y. The rows of a pair
+/// that the support meets are the bits of one integer, so that a pair is a single loop over them.
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "esvr/ellipsoids.h"
@@ -14,11 +16,9 @@ namespace esvr {
 
 /// The values that the forward pass over a pair records for the backward pass.
 struct PairTape {
-  float* phi;             ///< rows of phi, in loop order; 64-byte aligned
-  int xBegin, xEnd;       ///< visited slices: xBegin to xEnd - 1
-  signed char yBegin[8];  ///< visited rows of each slice: yBegin to yEnd - 1
-  signed char yEnd[8];
-  int floats;  ///< length of phi
+  float* phi;          ///< vectors of phi, in the order of the bits of `rows`; 64-byte aligned
+  std::uint64_t rows;  ///< the visited vectors: bit 8 y + x, or 4 y + x for even y with two rows
+  int floats;          ///< length of phi
 };
 
 /// Sums over a pair's voxels. r is the derivative of the loss by V, phi' the derivative of phi by
@@ -33,6 +33,9 @@ struct PairMoments {
   float rEdge;                       ///< sum r (phi + base) (1 - phi): derivative by kappa / slope
 };
 
+/// Sums of the members of PairMoments, in their order.
+using MomentTotals = std::array<double, sizeof(PairMoments) / sizeof(float)>;
+
 /// The two sums that a solve for the intensities needs.
 struct PairProjection {
   float rPhi, phi2;
@@ -42,18 +45,25 @@ struct BrickKernels {
   const char* name;
   /// Adds intensity * phi to the kBrickVoxels values of `sum`.
   /// \param corner  first voxel of the brick, in the frame of f.center
-  void (*add)(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
+  void (*add)(const BrickForm& f, const float corner[3], const KernelConstants<float>& k,
               float* sum);
   /// Does the same and records phi on the tape. tape.phi must have room for kBrickVoxels floats.
-  void (*forward)(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
+  void (*forward)(const BrickForm& f, const float corner[3], const KernelConstants<float>& k,
                   float* sum, PairTape& tape);
   /// Computes the moments. \param r  derivative of the loss by V at the brick's voxels
-  void (*backward)(const LineForm& f, const float corner[3], const KernelConstants<float>& k,
+  void (*backward)(const BrickForm& f, const float corner[3], const KernelConstants<float>& k,
                    const float* r, const PairTape& tape, PairMoments& moments);
   /// Have the same results as forward() and backward(), bit by bit, but read phi from the tape of
   /// an earlier forward pass with the same shapes.
   void (*addTape)(const PairTape& tape, float intensity, float* sum);
   void (*projectTape)(const PairTape& tape, const float* r, PairProjection& projection);
+  /// Starts the residuals of a brick: r = -target.
+  void (*start)(const float* target, float* r);
+  /// Replaces r = V - target by clamp(V, low, high) - target.
+  /// \return sum of r^2: in float32 in each lane, and in float64 over the lanes
+  double (*finish)(const float* target, float low, float high, float* r);
+  /// Sums moments in float64, in their order.
+  void (*sumMoments)(const PairMoments* moments, std::size_t count, MomentTotals& sums);
 };
 
 /// The kernels for all instruction sets that this processor has, the best first.
@@ -73,7 +83,7 @@ struct PlaceBlock {
 /// Adds intensity * phi to the sum of each place. This is not one of the BrickKernels, so that a program
 /// that evaluates no places does not contain the loop.
 /// \param corner  first voxel of the brick, in the frame of f.center
-using AddPlaces = void (*)(const LineForm& f, const float corner[3],
+using AddPlaces = void (*)(const BrickForm& f, const float corner[3],
                            const KernelConstants<float>& k, const PlaceBlock& places, float* sum);
 
 /// The loops for all instruction sets that this processor has, in the order of runnableKernels().

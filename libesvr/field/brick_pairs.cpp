@@ -164,30 +164,45 @@ void forEachPair(const BrickIndex& index, const Support& support, Visit&& visit)
   for (const std::uint32_t b : touched) visit(b);
 }
 
-/// Calls visit(ellipsoid, n, brick) for every pair; n counts the pairs of the ellipsoid. Ellipsoids
-/// are visited in parallel.
-template <class Visit>
-void visitPairs(const BrickIndex& index, std::size_t ellipsoids, const SupportOf& supportOf,
-                Visit&& visit) {
-  parallelFor(EllipsoidRange(0, ellipsoids, 64), [&](const EllipsoidRange& range) {
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      std::uint32_t n = 0;
-      forEachPair(index, supportOf(i), [&](std::uint32_t b) { visit(i, n++, b); });
+/// The bricks of some ellipsoids, one list behind the other.
+struct PartLists {
+  std::vector<std::uint32_t> lengths;  ///< by ellipsoid
+  std::vector<std::uint32_t> bricks;   ///< numbers; kNone: the brick is in `missing`
+  std::vector<Coord> missing;          ///< bricks without a number, in their order
+};
+constexpr std::size_t kPartSize = 64;  ///< ellipsoids of a part
+
+/// Lists the bricks of all ellipsoids with one walk around each. Parts are filled in parallel.
+/// \param list  list(support, part) appends the bricks of a support
+template <class List>
+std::vector<PartLists> listParts(std::size_t ellipsoids, const SupportOf& supportOf,
+                                 const List& list) {
+  std::vector<PartLists> parts((ellipsoids + kPartSize - 1) / kPartSize);
+  parallelFor(std::size_t(0), parts.size(), [&](std::size_t p) {
+    PartLists& part = parts[p];
+    for (std::size_t i = p * kPartSize; i < std::min(ellipsoids, (p + 1) * kPartSize); ++i) {
+      const std::size_t before = part.bricks.size();
+      list(supportOf(i), part);
+      part.lengths.push_back(std::uint32_t(part.bricks.size() - before));
     }
   });
+  return parts;
 }
 
-/// Lists the bricks of all ellipsoids, one list behind the other.
-std::vector<std::uint32_t> bricksByEllipsoid(const BrickIndex& index, std::size_t ellipsoids,
-                                             const SupportOf& supportOf,
-                                             std::vector<std::uint32_t>& begin) {
-  begin.assign(ellipsoids + 1, 0);
-  visitPairs(index, ellipsoids, supportOf,
-             [&](std::size_t i, std::uint32_t n, std::uint32_t) { begin[i] = n + 1; });
+/// Joins the lists of all ellipsoids and clears the parts.
+/// \param begin  gets the first place of each ellipsoid's list, and the end
+std::vector<std::uint32_t> joinLists(std::vector<PartLists>& parts,
+                                     std::vector<std::uint32_t>& begin) {
+  for (const PartLists& part : parts)
+    begin.insert(begin.end(), part.lengths.begin(), part.lengths.end());
+  begin.push_back(0);
   makeOffsets(begin);
   std::vector<std::uint32_t> bricks(begin.back());
-  visitPairs(index, ellipsoids, supportOf,
-             [&](std::size_t i, std::uint32_t n, std::uint32_t b) { bricks[begin[i] + n] = b; });
+  parallelFor(std::size_t(0), parts.size(), [&](std::size_t p) {
+    std::copy(parts[p].bricks.begin(), parts[p].bricks.end(),
+              bricks.begin() + begin[p * kPartSize]);
+    parts[p] = {};
+  });
   return bricks;
 }
 
@@ -254,8 +269,42 @@ class PairSort {
 
 BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
                        const SupportOf& supportOf) {
+  auto parts = listParts(ellipsoids, supportOf, [&](const Support& support, PartLists& part) {
+    forEachPair(index, support, [&](std::uint32_t b) { part.bricks.push_back(b); });
+  });
   BrickPairs pairs;
-  const auto bricks = bricksByEllipsoid(index, ellipsoids, supportOf, pairs.ellipsoidBegin);
+  const auto bricks = joinLists(parts, pairs.ellipsoidBegin);
+  PairSort(bricks, index.size(), pairs).sort();
+  return pairs;
+}
+
+BrickPairs pairsOfAll(BrickIndex& index, std::size_t ellipsoids, const SupportOf& supportOf,
+                      const Box& within) {
+  Box everything = within;
+  if (!index.bounds().empty()) everything.expand(index.bounds());
+  auto parts = listParts(ellipsoids, supportOf, [&](const Support& support, PartLists& part) {
+    forEachReachedBrick(support, everything, [&](Coord brick) {
+      const std::uint32_t b = index.find(brick);
+      if (b == BrickIndex::kNone) {
+        if (!within.contains(brick)) return;
+        part.missing.push_back(brick);
+      }
+      part.bricks.push_back(b);
+    });
+  });
+  std::vector<Coord> missing;
+  for (const PartLists& part : parts)
+    missing.insert(missing.end(), part.missing.begin(), part.missing.end());
+  tbb::parallel_sort(missing.begin(), missing.end());
+  missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
+  index.append(missing);
+  parallelFor(std::size_t(0), parts.size(), [&](std::size_t p) {
+    auto next = parts[p].missing.begin();
+    for (std::uint32_t& b : parts[p].bricks)
+      if (b == BrickIndex::kNone) b = index.find(*next++);
+  });
+  BrickPairs pairs;
+  const auto bricks = joinLists(parts, pairs.ellipsoidBegin);
   PairSort(bricks, index.size(), pairs).sort();
   return pairs;
 }

@@ -42,6 +42,14 @@ using SupportOf = std::function<Support(std::size_t)>;
 [[nodiscard]] BrickPairs pairsWithin(const BrickIndex& index, std::size_t ellipsoids,
                                      const SupportOf& supportOf);
 
+/// The pairs of ellipsoids and all bricks that they reach. Bricks that the index does not have are
+/// appended in increasing order.
+/// \param within  box of brick coordinates; bricks outside that the index does not have are ignored
+/// \throws RuntimeFailure  as above
+[[nodiscard]] BrickPairs pairsOfAll(BrickIndex& index, std::size_t ellipsoids,
+                                    const SupportOf& supportOf,
+                                    const Box& within = bricksOf(Box::whole()));
+
 /// The pairs of supports and bricks that are given by their corners.
 /// \param corners  index corners of the bricks, multiples of 8
 [[nodiscard]] BrickPairs pairsWith(std::span<const Support> reach, std::span<const Coord> corners);

@@ -49,7 +49,7 @@ GatheredField gather(const Field& field) {
     const Ellipsoids& e = chunk.ellipsoids;
     const double kappa = kappaOf(field, e, i);
     const double radius = supportRadius(kernelConstants<double>(field.kernel, kappa));
-    g.forms[n] = makeLineForm(centerOf(e, i), unitFrame(e, i), radius, e.intensity[i]);
+    g.forms[n] = makeBrickForm(centerOf(e, i), unitFrame(e, i), radius, e.intensity[i]);
     if (several) g.kernels[n] = kernelConstants<float>(field.kernel, kappa);
     g.chunkOf[n] = c;
   });

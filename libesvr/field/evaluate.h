@@ -24,7 +24,7 @@ namespace esvr {
 
 /// The ellipsoids of all chunks of a field, prepared for evaluation.
 struct GatheredField {
-  std::vector<LineForm> forms;                  ///< centers relative to their chunk's origin
+  std::vector<BrickForm> forms;                 ///< centers relative to their chunk's origin
   std::vector<KernelConstants<float>> kernels;  ///< one for all, or one for each ellipsoid
   std::vector<Coord> origins;                   ///< origins of the chunks
   std::vector<std::uint32_t> chunkOf;           ///< chunk of each ellipsoid

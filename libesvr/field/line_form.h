@@ -94,6 +94,37 @@ ESVR_HD inline double conditionalSigmaY(const Vec3& ly, const Vec3& lz) {
   return f;
 }
 
+/// An ellipsoid prepared for the evaluation of bricks with SIMD. Its support is
+///
+///     (dx / halfX)^2 + ((dy - slopeYx dx) / halfYx)^2 + ((dz - slopeZx dx - slopeZy dy) / halfZ)^2 < 1
+///
+/// with the half width halfZ along z for given x and y. The first two terms and the smallest third
+/// one in a range of z decide whether a row along z meets the support. All half widths are those of
+/// the support and a hundredth of a voxel more, because of rounding.
+struct BrickForm : LineForm {
+  float inverseX, inverseY, inverseZ;  ///< 1 / halfX, 1 / halfYx, 1 / halfZ
+  float yByX;                          ///< slopeYx / halfYx
+  float zByX, zByY;                    ///< slopeZx / halfZ, slopeZy / halfZ
+};
+
+/// The parameters are those of makeLineForm().
+[[nodiscard]] inline BrickForm makeBrickForm(const std::array<double, 3>& center, const Matrix3& L,
+                                             double radius, double intensity) {
+  using namespace line_form;
+  const Vec3 lx = columnOf(L, 0), ly = columnOf(L, 1), lz = columnOf(L, 2);
+  const double zz = dot(lz, lz);
+  const auto inverseOf = [](double half) { return 1.0 / (half * (1.0 + 1e-6) + 0.01); };
+  BrickForm f{makeLineForm(center, L, radius, intensity), {}, {}, {}, {}, {}, {}};
+  const double y = inverseOf(f.halfYx), z = inverseOf(radius / std::sqrt(zz));
+  f.inverseX = float(inverseOf(f.halfX));
+  f.inverseY = float(y);
+  f.inverseZ = float(z);
+  f.yByX = float(f.slopeYx * y);
+  f.zByX = float(-dot(lx, lz) / zz * z);
+  f.zByY = float(-dot(ly, lz) / zz * z);
+  return f;
+}
+
 /// The matrix L = S^-1 R^T of ellipsoid i, which maps a displacement d to u = L d.
 [[nodiscard]] inline Matrix3 unitFrame(const Ellipsoids& e, std::size_t i) {
   const Quaternion q{e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]};

@@ -23,18 +23,40 @@ BrickMask maskOf(const Box& box, Coord corner) {
   return mask;
 }
 
+namespace {
+
+/// The voxels of a brick among those that are always active.
+BrickMask alwaysActiveIn(const RevoxeliseOptions& options, Coord corner) {
+  BrickMask mask;
+  for (const Coord voxel : options.alwaysActive)
+    if (brickOf(voxel) == brickOf(corner)) mask.set(voxelOffset(localOf(voxel)));
+  return mask;
+}
+
+}  // namespace
+
 BrickRegion regionIn(const RevoxeliseOptions& options, Coord corner) {
   const BrickMask inBox = maskOf(options.box, corner);
-  if (!options.restrictToBricks) return {inBox, true};
+  if (!options.restrictToBricks) return {inBox, alwaysActiveIn(options, corner)};
   const auto at = std::lower_bound(options.bricks.begin(), options.bricks.end(), corner);
   if (at == options.bricks.end() || *at != corner) return {};
-  const auto place = std::size_t(at - options.bricks.begin());
-  if (!options.levels.empty()) return {inBox, true, &options.levels[place]};
-  if (options.masks.empty()) return {inBox, true};
-  BrickRegion region{inBox, false};
+  if (options.masks.empty()) return {inBox, alwaysActiveIn(options, corner)};
+  BrickRegion region{inBox, options.masks[std::size_t(at - options.bricks.begin())]};
   for (std::size_t w = 0; w < inBox.words.size(); ++w)
-    region.within.words[w] &= options.masks[place].words[w];
+    region.within.words[w] &= region.certain.words[w];
   return region;
+}
+
+std::vector<Coord> voxelBricks(const Field& field, const RevoxeliseOptions& options) {
+  if (options.restrictToBricks) return {options.bricks.begin(), options.bricks.end()};
+  std::vector<Coord> bricks = reachedBricks(field, options.box);
+  for (const Coord voxel : options.alwaysActive) {
+    if (!options.box.contains(voxel)) continue;
+    const Coord corner = voxel - localOf(voxel);
+    const auto at = std::ranges::lower_bound(bricks, corner);
+    if (at == bricks.end() || *at != corner) bricks.insert(at, corner);
+  }
+  return bricks;
 }
 
 BrickMask settle(const VoxelRule& rule, const BrickRegion& region, std::span<float> values) {
@@ -95,8 +117,7 @@ SparseVolume settledBricks(const Field& field, std::span<const Coord> corners,
 }  // namespace
 
 SparseVolume revoxelise(const Field& field, const RevoxeliseOptions& options) {
-  if (options.restrictToBricks) return settledBricks(field, options.bricks, options);
-  return settledBricks(field, reachedBricks(field, options.box), options);
+  return settledBricks(field, voxelBricks(field, options), options);
 }
 
 }  // namespace esvr

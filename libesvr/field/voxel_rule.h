@@ -30,10 +30,6 @@ struct VoxelRule {
     return narrowBand ? background - std::fabs(settled) : std::fabs(settled - background);
   }
   [[nodiscard]] ESVR_HD bool isActive(float settled) const { return activity(settled) > threshold; }
-  /// The same with the threshold of a level (ellipsoids.h).
-  [[nodiscard]] ESVR_HD bool isActive(float settled, int level) const {
-    return activity(settled) > thresholdAt(threshold, level);
-  }
   /// The value of an inactive voxel.
   [[nodiscard]] ESVR_HD float inactiveValue(float settled) const {
     return narrowBand ? std::copysign(background, settled) : background;
@@ -83,15 +79,13 @@ ESVR_HD inline LocalBox localBox(const Box& box, const Coord& corner, int last) 
 
 /// How the voxels of one brick become active.
 struct BrickRegion {
-  BrickMask within;     ///< no other voxel is active
-  bool byValue = true;  ///< true: the rule of values decides about these; false: all are active
-  const BlockLevels* levels = nullptr;  ///< levels of the brick's blocks; null: one threshold
+  BrickMask within;  ///< no other voxel is active
+  BrickMask
+      certain;  ///< these are active whatever their values; the rule of values decides about the others
 
   /// \param v  voxelOffset of a voxel, of which `settled` is the value by the rule
   [[nodiscard]] bool isActive(const VoxelRule& rule, int v, float settled) const {
-    if (!within.test(v)) return false;
-    if (!byValue) return true;
-    return levels ? rule.isActive(settled, levels->at(v)) : rule.isActive(settled);
+    return within.test(v) && (certain.test(v) || rule.isActive(settled));
   }
 };
 
@@ -100,6 +94,10 @@ struct BrickRegion {
 
 /// \param corner  index coordinates of the brick's first voxel
 [[nodiscard]] BrickRegion regionIn(const RevoxeliseOptions& options, Coord corner);
+
+/// The bricks (increasing index corners) that may have an active voxel.
+/// \throws MemoryExceeded  as for reachedBricks
+[[nodiscard]] std::vector<Coord> voxelBricks(const Field& field, const RevoxeliseOptions& options);
 
 /// Turns the sums of one brick into voxels. \return the mask of its active voxels
 BrickMask settle(const VoxelRule& rule, const BrickRegion& region, std::span<float> values);

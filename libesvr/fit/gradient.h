@@ -23,12 +23,6 @@ struct EllipsoidGradient {
 /// Moments of an ellipsoid's pairs, summed in float64 in the pairs' order.
 struct PairSums {
   double w0x, w0z, w0xx, w0xz, w0zz, w1, w1x, w1z, w2, rPhi, phi2, rEdge;
-
-  ESVR_HD void add(const PairMoments& m) {
-    w0x += m.w0x, w0z += m.w0z, w0xx += m.w0xx, w0xz += m.w0xz, w0zz += m.w0zz;
-    w1 += m.w1, w1x += m.w1x, w1z += m.w1z, w2 += m.w2, rPhi += m.rPhi, phi2 += m.phi2;
-    rEdge += m.rEdge;
-  }
 };
 
 /// With the position u = px dx + pz dz + ly t in the unit frame,

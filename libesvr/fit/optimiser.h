@@ -78,6 +78,8 @@ class Optimiser {
   [[nodiscard]] virtual std::uint32_t batchSize() const = 0;
 
   [[nodiscard]] virtual FitErrors measure() = 0;
+  /// The same where an iteration follows, which may then share the pass over the bricks.
+  [[nodiscard]] virtual FitErrors measureBeforeIteration() { return measure(); }
 
   /// The current kernel.
   [[nodiscard]] virtual const Kernel& kernel() const = 0;

@@ -124,7 +124,7 @@ class FitRun {
     while (!finished()) {
       if (recorder_.cancelled()) return FitEnd::kCancelled;
       if (isEvent() && !isDoneBefore()) events();
-      if (plan_.curve && done_ % recordInterval() == 0) record();
+      if (plan_.curve && done_ % recordInterval() == 0) record(optimiser_.measureBeforeIteration());
       const double psnr = psnrOf(iterate(), target_.boxVoxels, target_.peak);
       report(psnr);
       if (plan_.psnr && psnr > *plan_.psnr && reachedExactly()) return FitEnd::kPsnrReached;
@@ -196,12 +196,14 @@ class FitRun {
     recorder_.report(now, fractionDone());
   }
 
-  const TimedCurvePoint& record() {
-    return recorder_.record(optimiser_.measure(), optimiser_.ellipsoidCount(), done_);
+  const TimedCurvePoint& record(const FitErrors& errors) {
+    return recorder_.record(errors, optimiser_.ellipsoidCount(), done_);
   }
 
   /// Measures the errors now; the loss of an iteration is that before its step.
-  bool reachedExactly() { return record().psnrBox > *plan_.psnr + kReachedMargin; }
+  bool reachedExactly() {
+    return record(optimiser_.measure()).psnrBox > *plan_.psnr + kReachedMargin;
+  }
 
   Optimiser& optimiser_;
   const FitTarget& target_;

@@ -1,6 +1,5 @@
 #pragma once
-/// The sections that say where voxels are active: the positions of bricks, masks, and levels of thresholds
-/// (esvr/ellipsoids.h).
+/// The sections that say where voxels are active: the positions of bricks, and masks.
 
 #include <cstddef>
 #include <span>
@@ -8,7 +7,6 @@
 #include <vector>
 
 #include "core/memory_budget.h"
-#include "esvr/ellipsoids.h"
 #include "esvr/volume.h"
 
 namespace esvr::format {
@@ -40,29 +38,5 @@ struct Mask {
 /// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] Mask getMask(std::span<const std::byte> content, const std::string& where,
                            MemoryBudget& budget);
-
-/// The previous mask, moved as the mask of a frame has moved since: what the voxels of the frame are
-/// predicted to be.
-/// \return masks of the bricks of the frame; empty if its mask lies too far from the previous one
-[[nodiscard]] std::vector<BrickMask> movedMask(const Mask& mask, const Mask& previous);
-
-// ---- Levels of thresholds
-
-/// Bricks and the levels of their blocks.
-struct Levels {
-  std::vector<Coord> bricks;  ///< index corners of the bricks, increasing
-  std::vector<BlockLevels> levels;
-};
-
-/// True if bricks lie near enough to each other for their levels to be stored: less than 2^24 voxels.
-[[nodiscard]] bool areNear(std::span<const Coord> corners);
-
-/// \throws RuntimeFailure  the corners are not multiples of 8, not increasing, or not near
-[[nodiscard]] std::vector<std::byte> putLevels(const Levels& levels);
-
-/// \throws BadInput  the content is damaged; the text begins with `where`
-/// \throws MemoryExceeded  the content may hold more bricks than the budget allows
-[[nodiscard]] Levels getLevels(std::span<const std::byte> content, const std::string& where,
-                               MemoryBudget& budget);
 
 }  // namespace esvr::format

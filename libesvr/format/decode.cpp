@@ -69,7 +69,6 @@ class GridDecoder {
     readChunks(grid);
     if (grid.topology == TopologyKind::kBricks) readBricks(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
-    if (grid.topology == TopologyKind::kBlocks) readLevels(grid);
     readVoxels(grid);
     readRelated(before, grid);
     readResidual(grid);
@@ -256,13 +255,6 @@ class GridDecoder {
     Mask mask = getMask(sections_.get(section), sections_.place(section), sections_.budget());
     grid.bricks = std::move(mask.bricks);
     grid.mask = std::move(mask.active);
-  }
-
-  void readLevels(StoredGrid& grid) {
-    const auto section = id(SectionKind::kLevels);
-    Levels levels = getLevels(sections_.get(section), sections_.place(section), sections_.budget());
-    grid.bricks = std::move(levels.bricks);
-    grid.levels = std::move(levels.levels);
   }
 
   void readVoxels(StoredGrid& grid) {
@@ -498,8 +490,7 @@ std::uint64_t heapBytesOf(const StoredGrid& grid) {
   for (const Chunk& chunk : grid.field.chunks)
     ellipsoids += double(chunk.ellipsoids.size()) * format::kDecodedBytesPerEllipsoid;
   return std::uint64_t(ellipsoids) + grid.bricks.size() * sizeof(Coord) +
-         grid.mask.size() * sizeof(BrickMask) + grid.levels.size() * sizeof(BlockLevels) +
-         (grid.voxels ? heapBytesOf(*grid.voxels) : 0) +
+         grid.mask.size() * sizeof(BrickMask) + (grid.voxels ? heapBytesOf(*grid.voxels) : 0) +
          (grid.residual ? heapBytesOf(*grid.residual) : 0);
 }
 

@@ -31,8 +31,8 @@ RevoxeliseOptions voxelRule(const StoredGrid& grid) {
   options.bricks = grid.bricks;
   options.restrictToBricks = grid.topology != TopologyKind::kThreshold;
   options.masks = grid.mask;
-  options.levels = grid.levels;
   options.box = grid.activeBox;
+  options.alwaysActive = grid.boxVoxels;
   return options;
 }
 
@@ -70,7 +70,10 @@ EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options)
 WorkEstimate estimateDecode(const StoredGrid& grid, const DecodeOptions& options) {
   if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size())};
   WorkEstimate work = estimateWork(grid.field, optionsFor(grid, options));
-  if (grid.topology != TopologyKind::kThreshold) work.bricks = double(grid.bricks.size());
+  if (grid.topology != TopologyKind::kThreshold)
+    work.bricks = double(grid.bricks.size());
+  else
+    work.bricks += double(grid.boxVoxels.size());
   if (grid.residual) work.bricks += double(grid.residual->bricks.size());
   return work;
 }
@@ -95,11 +98,10 @@ struct WantedVoxels {
   RevoxeliseOptions rule;
   std::vector<Coord> bricks{};
   std::vector<BrickMask> masks{};
-  std::vector<BlockLevels> levels{};
 
   WantedVoxels(const StoredGrid& grid, const DecodeOptions& options) : rule(voxelRule(grid)) {
     rule.threshold = options.threshold.value_or(rule.threshold);
-    if (options.threshold) rule.masks = {}, rule.levels = {};
+    if (options.threshold) rule.masks = {}, rule.alwaysActive = {};
     rule.box = placeOf(grid, options);
     rule.memory = options.memory;
     if (rule.restrictToBricks && options.box) takeThose();
@@ -114,15 +116,13 @@ struct WantedVoxels {
       if (!meets(rule.box, rule.bricks[b])) continue;
       bricks.push_back(rule.bricks[b]);
       if (!rule.masks.empty()) masks.push_back(rule.masks[b]);
-      if (!rule.levels.empty()) levels.push_back(rule.levels[b]);
     }
     rule.bricks = bricks;
     rule.masks = masks;
-    rule.levels = levels;
   }
 };
 
-/// The bricks of the sum that may have an active voxel, and those of the residual, in order.
+/// The bricks of the grid that may have an active voxel, with those of the residual, in order.
 std::vector<Coord> withResidualBricks(const StoredGrid& grid, const RevoxeliseOptions& rule) {
   const VoxelLayer& residual = *grid.residual;
   if (rule.restrictToBricks) return {rule.bricks.begin(), rule.bricks.end()};
@@ -131,8 +131,8 @@ std::vector<Coord> withResidualBricks(const StoredGrid& grid, const RevoxeliseOp
     const Coord corner = residual.origin + brick * kBrickSide;
     if (meets(rule.box, corner)) own.push_back(corner);
   }
-  const auto reached = reachedBricks(grid.field, rule.box);
-  std::set_union(reached.begin(), reached.end(), own.begin(), own.end(), std::back_inserter(all));
+  const auto bricks = voxelBricks(grid.field, rule);
+  std::ranges::set_union(bricks, own, std::back_inserter(all));
   return all;
 }
 

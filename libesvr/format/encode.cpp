@@ -104,8 +104,6 @@ void checkGrid(const StoredGrid& grid) {
     refuse(grid, "it has bricks, but a topology without");
   if (grid.mask.size() != (grid.topology == TopologyKind::kMask ? grid.bricks.size() : 0))
     refuse(grid, "its mask is not that of its topology");
-  if (grid.levels.size() != (grid.topology == TopologyKind::kBlocks ? grid.bricks.size() : 0))
-    refuse(grid, "its levels are not those of its topology");
   if (grid.reference && !grid.voxels) refuse(grid, "it has a reference, but no voxels");
   if (!grid.quantised.empty() && grid.quantised.size() != grid.field.chunks.size())
     refuse(grid, "its quantised chunks are not those of its field");
@@ -213,8 +211,6 @@ void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> 
   const StoredGrid& grid = grids[g];
   if (grid.topology == TopologyKind::kMask)
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.bricks, grid.mask));
-  else if (grid.topology == TopologyKind::kBlocks)
-    out.addRaw({SectionKind::kLevels, g}, kRequired, putLevels({grid.bricks, grid.levels}));
   else if (!grid.bricks.empty())
     out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks));
   if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);
@@ -305,9 +301,11 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
   out.setLayout(file.layout);
-  constexpr std::uint16_t kFarBackgrounds = 5;  // the minor version that has them
-  if (std::ranges::any_of(file.grids, &StoredGrid::farBackground))
-    out.requireVersion(kFarBackgrounds);
+  constexpr std::uint16_t kTopologiesOfBoxes = 5;  // far backgrounds and box voxels
+  if (std::ranges::any_of(file.grids, [](const StoredGrid& grid) {
+        return grid.farBackground || !grid.boxVoxels.empty();
+      }))
+    out.requireVersion(kTopologiesOfBoxes);
   if (!inherited.metadata) addFileMetadata(out, file);
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <string_view>
 #include <utility>
 
+#include "core/geometry.h"
 #include "esvr/error.h"
 
 namespace esvr::format {
@@ -79,28 +81,67 @@ GridDescriptor getDescriptor(ByteReader& in) {
   return d;
 }
 
-/// Added to the number of a topology if the grid has StoredGrid::farBackground.
-constexpr std::uint8_t kFarBackground = 4;
-enum class TopologyByte : std::uint8_t {
-  kLast = std::uint8_t(TopologyKind::kBlocks) + kFarBackground
-};
+// Added to the number of a topology.
+constexpr std::uint8_t kTopologies = 4;     // the numbers of topologies are below this
+constexpr std::uint8_t kFarBackground = 4;  // StoredGrid::farBackground
+constexpr std::uint8_t kHasBoxVoxels = 8;   // the record has StoredGrid::boxVoxels
+
+void putTopology(ByteWriter& out, const StoredGrid& grid) {
+  unsigned topology = unsigned(grid.topology);
+  if (grid.farBackground) topology += kFarBackground;
+  if (!grid.boxVoxels.empty()) topology += kHasBoxVoxels;
+  out.put(std::uint8_t(topology));
+}
+
+/// \return whether the record has box voxels
+bool getTopology(ByteReader& in, StoredGrid& grid) {
+  const auto topology = in.get<std::uint8_t>();
+  const bool isKnown =
+      topology < 2 * kHasBoxVoxels && topology % kTopologies <= std::uint8_t(TopologyKind::kMask);
+  if (!isKnown) in.fail("unknown topology " + std::to_string(topology));
+  grid.topology = TopologyKind(topology % kTopologies);
+  grid.farBackground = (topology & kFarBackground) != 0;
+  return (topology & kHasBoxVoxels) != 0;
+}
+
+/// Writes voxels by their distances from the lowest corner of the active box.
+void putBoxVoxels(ByteWriter& out, const StoredGrid& grid) {
+  if (grid.boxVoxels.empty()) return;
+  out.put(std::uint8_t(grid.boxVoxels.size()));
+  for (const Coord voxel : grid.boxVoxels)
+    for (const auto axis : kAxes)
+      putVarint(out, std::uint64_t(std::int64_t{voxel.*axis} - grid.activeBox.min.*axis));
+}
+
+std::vector<Coord> getBoxVoxels(ByteReader& in, const Box& box) {
+  std::vector<Coord> voxels(in.get<std::uint8_t>());
+  if (voxels.empty()) in.fail("a list of box voxels without any");
+  for (Coord& voxel : voxels)
+    for (const auto axis : kAxes) {
+      const std::uint64_t distance = getVarint(in);
+      if (box.empty() || distance > std::uint64_t(std::int64_t{box.max.*axis} - box.min.*axis))
+        in.fail("a box voxel lies outside the bounding box");
+      voxel.*axis = std::int32_t(std::int64_t{box.min.*axis} + std::int64_t(distance));
+    }
+  return voxels;
+}
 
 void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
-  out.put(std::uint8_t(std::uint8_t(grid.topology) + (grid.farBackground ? kFarBackground : 0)));
+  putTopology(out, grid);
   putEnum(out, grid.withinRange);
   out.put(grid.activeThreshold);
   putBox(out, grid.activeBox);
+  putBoxVoxels(out, grid);
   out.put(grid.activeVoxels);
   out.put(grid.valueMin);
   out.put(grid.valueMax);
 }
 void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
-  const auto topology = std::uint8_t(in.getEnum(TopologyByte::kLast, "topology"));
-  grid.topology = TopologyKind(topology % kFarBackground);
-  grid.farBackground = topology >= kFarBackground;
+  const bool hasBoxVoxels = getTopology(in, grid);
   grid.withinRange = getBool(in, "mark of a range of values");
   grid.activeThreshold = in.get<float>();
   grid.activeBox = getBox(in);
+  if (hasBoxVoxels) grid.boxVoxels = getBoxVoxels(in, grid.activeBox);
   grid.activeVoxels = in.get<std::uint64_t>();
   grid.valueMin = in.get<float>();
   grid.valueMax = in.get<float>();
@@ -400,6 +441,19 @@ bool validAffine(const Transform& transform) {
          std::all_of(transform.affine->begin(), transform.affine->end(), finite);
 }
 
+/// What is wrong with the box voxels of a grid; null: nothing.
+const char* boxVoxelFaultOf(const StoredGrid& grid) {
+  const auto& voxels = grid.boxVoxels;
+  if (voxels.empty()) return nullptr;
+  if (grid.topology == TopologyKind::kMask) return "it has a mask and box voxels";
+  if (voxels.size() > kMostBoxVoxels) return "it has more box voxels than a box has faces";
+  if (!std::ranges::all_of(voxels, [&](Coord v) { return grid.activeBox.contains(v); }))
+    return "a box voxel lies outside the bounding box";
+  const bool isSorted =
+      std::adjacent_find(voxels.begin(), voxels.end(), std::greater_equal<>()) == voxels.end();
+  return isSorted ? nullptr : "its box voxels are not in order";
+}
+
 std::optional<Fault> nonFinite(SectionKind section, const char* what,
                                std::span<const std::vector<float>> planes) {
   for (const auto& plane : planes) {
@@ -463,8 +517,7 @@ std::optional<Fault> faultOf(const StoredGrid& grid) {
       grid.topology != TopologyKind::kThreshold)
     return fault("a far background needs a mask or voxels");
   if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
-  if (grid.topology == TopologyKind::kBlocks && !(grid.activeThreshold > 0.0f))
-    return fault("the threshold of blocks is not above 0");
+  if (const char* text = boxVoxelFaultOf(grid)) return fault(text);
   if (!allFinite({grid.valueMin, grid.valueMax}) || grid.valueMin > grid.valueMax)
     return fault("the range of values is not finite or empty");
   return std::nullopt;

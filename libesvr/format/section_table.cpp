@@ -47,7 +47,6 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kCarriedBytes, "carried bytes"},
     {SectionKind::kPredicted, "predicted grid"},
     {SectionKind::kRelated, "related voxels"},
-    {SectionKind::kLevels, "levels"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"},
@@ -88,7 +87,6 @@ std::uint16_t minorVersionOf(SectionKind kind) {
     case SectionKind::kGridRecords:
     case SectionKind::kPacked:
     case SectionKind::kRelated:
-    case SectionKind::kLevels:
       return 4;
     default:
       return 0;

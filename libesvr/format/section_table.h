@@ -58,7 +58,6 @@ enum class SectionKind : std::uint32_t {
   kCarriedBytes = 38,
   kPredicted = 39,
   kRelated = 41,
-  kLevels = 43,
   kSequenceIndex = 64,
 };
 

@@ -95,7 +95,8 @@ std::vector<std::byte> encodeStreams(const VoxelLayer& layer, const codec::Voxel
   for (const auto b : order) keys.push_back(codec::keyOf(layer.bricks[b]));
   codec::Writer writer;
   codec::CellTree<codec::Writer>(writer).code(keys, 3 * bits);
-  const auto streams = codec::encodeVoxels(std::move(writer), model, layer);
+  auto streams = codec::encodeVoxels(model, layer);
+  streams.insert(streams.begin(), writer.coder.finish());
   ByteWriter out;
   for (std::size_t n = 0; n + 1 < streams.size(); ++n) out.put(std::uint32_t(streams[n].size()));
   for (const auto& stream : streams) out.putAll(stream);
@@ -118,7 +119,7 @@ std::vector<codec::StreamView> getStreams(ByteReader& in, std::uint64_t count) {
 
 void decodeStreams(ByteReader& in, const BrickCount& count, const codec::VoxelModel& model,
                    VoxelLayer& layer) {
-  const auto streams = getStreams(in, codec::blockCount(count.bricks, model));
+  const auto streams = getStreams(in, codec::blockCount(count.bricks, model) + 1);
   codec::Reader reader{codec::RangeDecoder(streams.front())};
   std::vector<std::uint64_t> keys(count.bricks);
   try {
@@ -127,7 +128,7 @@ void decodeStreams(ByteReader& in, const BrickCount& count, const codec::VoxelMo
     layer.codes.resize(count.bricks * kBrickVoxels);
     layer.active.resize(count.bricks);
     layer.vacant.resize(count.bricks);
-    codec::decodeVoxels(reader, std::span(streams).subspan(1), model, layer);
+    codec::decodeVoxels(std::span(streams).subspan(1), model, layer);
   } catch (const BadInput& error) {
     in.fail(error.what());
   }

@@ -206,6 +206,8 @@ VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& 
   m.massReference = sums.massReference;
   m.massCandidate = sums.massCandidate;
   if (options.ssim) m.ssim = ssim3d(reference, candidate, c.domain.box, c.peak);
+  if (options.transmittance)
+    m.transmittance = transmittancePsnr(reference, candidate, c.domain.box);
   return m;
 }
 

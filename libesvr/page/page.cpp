@@ -85,13 +85,9 @@ void putPoints(Json& json, const OpacityCurve& curve) {
   json.raw("]");
 }
 
-/// The look that esvr-render gives a grid without options (render/look.cpp).
-TransferFunction usualLook(const StoredGrid& grid) {
-  const float background = float(grid.descriptor.background);
-  if (grid.descriptor.gridClass == GridClass::kLevelSet && background > 0.0f)
-    return levelSetSurface(double(background));
-  const ValueRange range{std::min(grid.valueMin, background), std::max(grid.valueMax, background)};
-  return rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, range);
+/// The look that esvr-render gives a grid without options.
+TransferFunction lookOf(const StoredGrid& grid) {
+  return usualLook(lookBasis(grid, kNoMemoryLimit));
 }
 
 void putLook(Json& json, const TransferFunction& f) {
@@ -142,7 +138,7 @@ void putGrid(Json& json, const StoredGrid& grid) {
   putVoxelSize(json.name("voxelSize"), grid.descriptor.transform);
   json.name("range").list(std::initializer_list<double>{grid.valueMin, grid.valueMax});
   json.name("histogram").raw("null");
-  putLook(json.name("defaultLook"), usualLook(grid));
+  putLook(json.name("defaultLook"), lookOf(grid));
   json.raw("}");
 }
 

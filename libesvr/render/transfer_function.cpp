@@ -10,7 +10,10 @@
 #include <numbers>
 #include <span>
 
+#include "esvr/container.h"
 #include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
 
 namespace esvr {
 
@@ -456,6 +459,61 @@ TransferFunction levelSetSurface(double band) {
   if (!(band > 0.0)) throw UsageError("the narrow band of a level set must be positive");
   return {{ColorSpace::kRgb, {{-band, kBody}, {0.0, kBody}, {0.0, kLayer}, {band, kLayer}}, {}},
           {{-band, 1.0}, {0.0, 1.0}, {0.0, kLayerOpacity}, {kLayerEnd * band, 0.0}, {band, 0.0}}};
+}
+
+namespace {
+
+ValueRange rangeWithBackground(const LookBasis& grid) {
+  ValueRange range = grid.range;
+  range.expand(grid.background);
+  return range;
+}
+
+/// The extinction per value and voxel with which a column of this depth lets half of the light
+/// through.
+double extinctionForHalf(double depth) { return std::log(2.0) / depth; }
+
+}  // namespace
+
+LookBasis lookBasis(const GridDescriptor& grid, const SparseVolume& volume) {
+  LookBasis basis{.background = volume.background,
+                  .isLevelSet = grid.gridClass == GridClass::kLevelSet};
+  if (activeVoxelCount(volume) > 0) basis.range = activeRange(volume);
+  if (grid.gridClass == GridClass::kFogVolume) basis.medianDepth = medianDepth(volume);
+  return basis;
+}
+
+LookBasis lookBasis(const StoredGrid& grid, std::uint64_t maxBytes) {
+  LookBasis basis{.range = {grid.valueMin, grid.valueMax},
+                  .background = float(grid.descriptor.background),
+                  .isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet};
+  if (grid.descriptor.gridClass != GridClass::kFogVolume || grid.activeBox.empty()) return basis;
+  basis.medianDepth = grid.voxels ? medianDepth(decodeGrid(grid, {.maxBytes = maxBytes}))
+                                  : medianDepth(grid.field, grid.activeBox, basis.range);
+  return basis;
+}
+
+OpacityCurve usualOpacity(const LookBasis& grid) {
+  constexpr double kFirst = 0.05, kLast = 8.0;  // extinctions; 8 leaves less than a thousandth
+  const ValueRange range = rangeWithBackground(grid);
+  OpacityCurve curve = rescaled({{}, builtInOpacity("linear")}, range).opacity;
+  if (!grid.medianDepth || range.min < 0.0f || !(range.max > 0.0f)) return curve;
+  const double k = extinctionForHalf(*grid.medianDepth);
+  OpacityCurve raised{curve.front()};
+  for (double extinction = kFirst; extinction < kLast; extinction *= 2.0) {
+    const double value = extinction / k, opacity = -std::expm1(-extinction);
+    if (!(value < double(range.max)) || opacity <= opacityAt(curve, value)) break;
+    raised.push_back({value, opacity});
+  }
+  raised.push_back(curve.back());
+  return raised;
+}
+
+TransferFunction usualLook(const LookBasis& grid, const std::string& colors) {
+  if (grid.isLevelSet && grid.background > 0.0f) return levelSetSurface(double(grid.background));
+  TransferFunction look = rescaled({builtInColorMap(colors), {}}, rangeWithBackground(grid));
+  look.opacity = usualOpacity(grid);
+  return look;
 }
 
 std::vector<std::string> builtInOpacities() { return namesOf<OpacityCurve>(kOpacities); }

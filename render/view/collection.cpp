@@ -24,13 +24,15 @@ ReadLimits limitsOf(const cli::HostMemory& memory) {
 }
 
 /// The grids of a file or of a frame that have something active.
-std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary) {
+/// \param measures  as for render::outlinesOf
+std::vector<ShownGrid> gridsOf(const EsvrFile& file, const EsvrSummary& summary,
+                               const render::SceneFile& from, bool measures) {
   std::vector<ShownGrid> grids;
   const auto names = namesOfStored(file);
   for (std::size_t i = 0; i < names.size(); ++i) {
     const StoredGrid& stored = file.grids[i];
     if (stored.activeBox.empty()) continue;
-    std::vector<render::Scene> outline{render::outlineOf(stored, names[i])};
+    std::vector<render::Scene> outline{render::outlineOf(stored, names[i], from, measures)};
     grids.push_back({names[i], stored.voxels ? "voxels" : "ellipsoids",
                      className(stored.descriptor.gridClass), std::move(outline),
                      stored.field.ellipsoidCount(), cli::storedBytes(summary, i),
@@ -56,7 +58,7 @@ void showSequence(const render::SceneFile& from, ShownFile& file) {
   for (const SequenceFrame& frame : reader.frames()) {
     file.frames.push_back(frame.number);
     const EsvrSummary summary = reader.inspect(frame.number);
-    enclose(gridsOf(reader.read(frame.number), summary), file.grids);
+    enclose(gridsOf(reader.read(frame.number), summary, from, file.grids.empty()), file.grids);
   }
 }
 
@@ -94,7 +96,7 @@ ShownFile showFile(const fs::path& path, const cli::HostMemory& memory) {
   if (cli::framesInFile(path))
     showSequence(from, file);
   else if (path.extension() == ".esvr")
-    file.grids = gridsOf(readEsvr(path, limitsOf(memory)), inspectEsvr(path));
+    file.grids = gridsOf(readEsvr(path, limitsOf(memory)), inspectEsvr(path), from, true);
   else
     showVdb(from, file);
   if (file.grids.empty()) throw BadInput(path.string() + ": no grid that can be drawn");

@@ -163,12 +163,11 @@ def paper(bench):
             def measured(name=name, key=key, changes=changes):
                 keys = {"epochs": bench.arguments.epochs, "points": min(100_000, PAPER_COUNTS[name]),
                         "max": PAPER_COUNTS[name], **changes}
-                _, row = bench.fit(name, "--paper", ",".join(f"{k}={v}" for k, v in keys.items()), "--topology",
-                                   "threshold")
+                _, row = bench.fit(name, "--paper", ",".join(f"{k}={v}" for k, v in keys.items()))
                 rows = [{"volume": name, "run": key, **row}]
                 if key == "ellipsoid":
-                    _, ours = bench.fit(name, "--count", row["ellipsoids"], "--topology", "threshold",
-                                        "--representation", "ellipsoids")
+                    _, ours = bench.fit(name, "--count", row["ellipsoids"], "--representation",
+                                        "ellipsoids")
                     rows.append({"volume": name, "run": "default fit", **ours})
                 return rows
             yield (name, key), measured

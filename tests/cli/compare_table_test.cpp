@@ -86,6 +86,7 @@ TEST_F(CompareTable, hasLosslessRowsWithoutError) {
     const json* row = rowOf(report, name);
     ASSERT_NE(row, nullptr) << name;
     EXPECT_TRUE((*row)["psnr_box"].is_null()) << name << " infinite";
+    EXPECT_TRUE((*row)["psnr_t50"].is_null()) << name << " infinite";
     EXPECT_EQ((*row)["max_error"], 0.0) << name;
     EXPECT_EQ((*row)["iou"], 1.0) << name;
     EXPECT_NEAR((*row)["ssim"].get<double>(), 1.0, 1e-12) << name;

@@ -141,7 +141,7 @@ TEST_F(Esvr2Vdb, saysSoWhereAThresholdLeavesNothing) {
 TEST_F(Esvr2Vdb, printsTheErrorAgainstAReference) {
   const auto run = esvr2vdb({in(), out(), "--reference", source()});
   EXPECT_EQ(run.exitCode, 0) << run.err;
-  for (const char* word : {"PSNR box", "SSIM", "IoU", "mass ref", "density", "heat"})
+  for (const char* word : {"PSNR box", "PSNR T 0.5", "SSIM", "IoU", "mass ref", "density", "heat"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 

@@ -60,6 +60,7 @@ TEST_F(EsvrRender, AStoredMaskIsDrawn) {
   EsvrFile file = readEsvr(folder_ / "in.esvr");
   StoredGrid& grid = file.grids[0];
   grid.topology = TopologyKind::kMask;
+  grid.boxVoxels.clear();
   grid.bricks = reachedBricks(grid.field);
   grid.mask.assign(grid.bricks.size(), BrickMask{});
   for (std::size_t b = 0; b < grid.bricks.size() / 2; ++b) grid.mask[b].setAll();

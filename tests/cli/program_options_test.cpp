@@ -69,9 +69,7 @@ TEST_F(Vdb2EsvrOption, ratioBoundsTheFile) {
 
 TEST_F(Vdb2EsvrOption, psnrIsReached) {
   // By value, because the bytes of a mask are larger for coarser sums.
-  const auto reaching = [&](const char* psnr) {
-    return quick({"--psnr", psnr, "--topology", "threshold"});
-  };
+  const auto reaching = [&](const char* psnr) { return quick({"--psnr", psnr}); };
   const Json coarse = reaching("25"), fine = reaching("40");
   EXPECT_GE(coarse["metrics"]["psnr_box"].get<double>(), 25.0);
   EXPECT_GE(fine["metrics"]["psnr_box"].get<double>(), 40.0);

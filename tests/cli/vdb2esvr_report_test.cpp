@@ -110,15 +110,32 @@ TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {
 
 TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
   const auto run = fitQuickly({"--report", "-"});
-  const Json metrics = Json::parse(run.out)["grids"][0]["metrics"];
+  const Json grid = Json::parse(run.out)["grids"][0], metrics = grid["metrics"];
   const std::string back = folder_ / "back.vdb";
   ASSERT_EQ(test::esvr2vdb({out(), back}).exitCode, 0);
-  const VolumeMetrics m =
-      compareVolumes(readGrid(in(), "density").volume, readGrid(back, "density").volume);
+  const VolumeMetrics m = compareVolumes(readGrid(in(), "density").volume,
+                                         readGrid(back, "density").volume, {.transmittance = true});
   EXPECT_EQ(metrics["psnr_box"].get<double>(), m.psnrBox);
   EXPECT_EQ(metrics["psnr_active"].get<double>(), m.psnrActive);
   EXPECT_EQ(metrics["max_error"].get<double>(), m.maxError);
   EXPECT_EQ(metrics["iou"].get<double>(), m.iou);
+  EXPECT_EQ(grid["quality"]["median_depth"].get<double>(), m.transmittance->medianDepth);
+  EXPECT_EQ(grid["quality"]["psnr_t90"].get<double>(), m.transmittance->psnr90);
+  EXPECT_EQ(grid["quality"]["psnr_t50"].get<double>(), m.transmittance->psnr50);
+  EXPECT_EQ(grid["quality"]["psnr_t10"].get<double>(), m.transmittance->psnr10);
+}
+
+TEST_F(Vdb2Esvr, reportsTransmittanceOnlyOfWhatIsLookedThrough) {
+  test::writeInput(in(),
+                   {{.voxels = softBall({})},
+                    {.name = "cold", .voxels = softBall({}, -1.0f)},
+                    {.name = "ambient", .voxels = softBall({}, 1.0f, 2.0f), .background = 2.0f}});
+  const auto run = fitQuickly({"--report", "-"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const Json grids = Json::parse(run.out)["grids"];
+  EXPECT_TRUE(grids[0]["quality"].is_object());
+  EXPECT_TRUE(grids[1]["quality"].is_null()) << "no column has a depth above 0";
+  EXPECT_TRUE(grids[2]["quality"].is_null()) << "space without voxels is not empty";
 }
 
 using Json = nlohmann::json;

@@ -18,7 +18,7 @@
 #include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 
 namespace esvr {
 namespace {
@@ -116,9 +116,10 @@ TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
   const auto run = convert({"--report", "-"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   const Json range = Json::parse(run.out)["grids"][0]["psnr_active"];
-  // The bound of quantised voxels is found to within some hundredths of a dB.
+  // The bound of quantised voxels is found to within some hundredths of a dB, but the frames take some
+  // 500 bytes, of which another lattice with a higher PSNR may save a few.
   EXPECT_GE(range[0], presetPsnr(Preset::kStandard));
-  EXPECT_LE(range[1], presetPsnr(Preset::kStandard) + 0.5);
+  EXPECT_LE(range[1], presetPsnr(Preset::kStandard) + 1.5);
   EXPECT_GT(sizeOf("out.0003.esvr"), sizeOf("out.0001.esvr"));
 }
 
@@ -227,6 +228,10 @@ TEST_F(SequenceFiles, areReportedWithAnEntryEach) {
   const double third = report["frames"][0]["grids"][0]["metrics"]["psnr_active"];
   EXPECT_THAT(report["grids"][0]["psnr_active"],
               ElementsAre(std::min(first, third), std::max(first, third)));
+  const double thin = grid["quality"]["psnr_t50"];
+  const double other = report["frames"][0]["grids"][0]["quality"]["psnr_t50"];
+  EXPECT_THAT(report["grids"][0]["psnr_t50"],
+              ElementsAre(std::min(thin, other), std::max(thin, other)));
 }
 
 TEST_F(SequenceFiles, areReportedAlsoWhereNothingCanBeConverted) {

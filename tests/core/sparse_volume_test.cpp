@@ -1,5 +1,5 @@
 // Plan: volumes are made from bricks in any order and anywhere, searched and measured, and broken ones are
-// found. Components of vectors get the bricks and the active voxels of all of them, with their own
+// found. The voxels that hold a box are those of the definition in small cases. Components of vectors get the bricks and the active voxels of all of them, with their own
 // backgrounds, also if one has no brick; lengths are those of the vectors voxel by voxel.
 
 #include "esvr/volume.h"
@@ -10,6 +10,8 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -249,6 +251,64 @@ TEST_F(BrokenVolume, AnOriginInsideABrickIsFound) {
 }
 
 // Vectors.
+
+/// Voxels on the faces of the box (0, 0, 0) to (15, 15, 7), with these values.
+SparseVolume onFaces(const std::vector<std::pair<Coord, float>>& voxels) {
+  std::vector<BrickInput> bricks(4);
+  for (std::size_t b = 0; b < bricks.size(); ++b) {
+    bricks[b].corner = Coord{std::int32_t(b / 2), std::int32_t(b % 2), 0} * kBrickSide;
+    bricks[b].values.fill(1.0f);
+    for (const auto& [at, value] : voxels)
+      if (at - localOf(at) == bricks[b].corner) {
+        bricks[b].values[std::size_t(voxelOffset(localOf(at)))] = value;
+        bricks[b].active.set(voxelOffset(localOf(at)));
+      }
+  }
+  return makeVolume(bricks, 1.0f);
+}
+
+TEST(BoxVoxels, AreFewAndTouchAllFaces) {
+  // Two corners touch all faces; the others touch one each and differ more from the background.
+  const SparseVolume corners = onFaces({{{0, 0, 0}, 1.0f},
+                                        {{15, 15, 7}, 2.0f},
+                                        {{0, 3, 3}, 9.0f},
+                                        {{15, 3, 3}, 9.0f},
+                                        {{7, 7, 3}, 9.0f}});
+  EXPECT_THAT(boxVoxels(corners, activeBox(corners)),
+              testing::ElementsAre(Coord{0, 0, 0}, Coord{15, 15, 7}));
+  // Of voxels that touch the same face, the one that differs most from the background is taken.
+  const SparseVolume sides = onFaces({{{0, 3, 3}, 1.5f},
+                                      {{0, 4, 4}, -3.0f},
+                                      {{15, 3, 3}, 2.0f},
+                                      {{4, 0, 3}, 2.0f},
+                                      {{4, 15, 3}, 2.0f},
+                                      {{4, 4, 0}, 2.0f},
+                                      {{4, 5, 0}, 1.0f},
+                                      {{4, 4, 7}, 2.0f}});
+  EXPECT_THAT(boxVoxels(sides, activeBox(sides)),
+              testing::ElementsAre(Coord{0, 4, 4}, Coord{4, 0, 3}, Coord{4, 4, 0}, Coord{4, 4, 7},
+                                   Coord{4, 15, 3}, Coord{15, 3, 3}));
+  EXPECT_THAT(boxVoxels(sides, activeBox(sides), 1u | 32u),
+              testing::ElementsAre(Coord{0, 4, 4}, Coord{4, 4, 7}));
+}
+
+TEST(BoxVoxels, OfOneVoxelAreThatVoxelAndOfNoneNothing) {
+  const SparseVolume one = makeVolume({brickWith({-16, 8, 1 << 30}, {3, 0, 7})}, 1.0f);
+  EXPECT_THAT(boxVoxels(one, activeBox(one)), testing::ElementsAre(activeBox(one).min));
+  EXPECT_EQ(touchedFaces(one, activeBox(one), one.active), kAllFaces);
+  EXPECT_TRUE(boxVoxels(SparseVolume{}, Box{}).empty());
+}
+
+TEST(BoxVoxels, FacesOfMasksAreThoseOfTheirVoxels) {
+  const SparseVolume volume =
+      onFaces({{{0, 3, 3}, 2.0f}, {{15, 15, 3}, 2.0f}, {{4, 0, 7}, 2.0f}, {{4, 4, 0}, 2.0f}});
+  const Box box = activeBox(volume);
+  EXPECT_EQ(touchedFaces(volume, box, volume.active), kAllFaces);
+  std::vector<BrickMask> masks(volume.brickCount());
+  EXPECT_EQ(touchedFaces(volume, box, masks), 0u);
+  masks.back() = volume.active.back();  // that of (15, 15, 3)
+  EXPECT_EQ(touchedFaces(volume, box, masks), 2u | 8u);
+}
 
 /// A volume with one active voxel.
 SparseVolume voxel(Coord at, float value, float background) {

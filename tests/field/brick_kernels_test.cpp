@@ -1,5 +1,6 @@
 // Plan: the kernels of every instruction set that this processor has agree with the baseline,
-// forward and backward, for ellipsoids inside, across and outside a brick. Sums differ by rounding
+// forward and backward, for ellipsoids inside, across and outside a brick. Rows that they leave out
+// contribute nothing, which a sum in float64 over all voxels shows. Sums differ by rounding
 // only, so the tolerance is a few hundred float32 ulp of the sum of magnitudes. The loops of SSIM agree
 // with the baseline up to rounding; such a sum has 11 products of numbers below 1 with weights whose sum
 // is 1, so the tolerance is 1e-15.
@@ -8,6 +9,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -26,19 +29,19 @@ struct Pass {
   PairMoments moments{};
 };
 
-std::vector<LineForm> forms(float kappa) {
+std::vector<BrickForm> forms(float kappa) {
   const Field field =
       test::randomField({.count = 100, .extent = 24, .smallest = 0.4, .aspect = 20});
   const double radius = supportRadius(kernelConstants<double>({.kappa = kappa}));
   const Ellipsoids& e = field.chunks[0].ellipsoids;
-  std::vector<LineForm> all;
+  std::vector<BrickForm> all;
   for (std::size_t i = 0; i < e.size(); ++i)
-    all.push_back(makeLineForm({e.center[0][i], e.center[1][i], e.center[2][i]}, unitFrame(e, i),
-                               radius, e.intensity[i]));
+    all.push_back(makeBrickForm({e.center[0][i], e.center[1][i], e.center[2][i]}, unitFrame(e, i),
+                                radius, e.intensity[i]));
   return all;
 }
 
-Pass run(const BrickKernels& kernels, const LineForm& form, const KernelConstants<float>& k) {
+Pass run(const BrickKernels& kernels, const BrickForm& form, const KernelConstants<float>& k) {
   Pass pass;
   alignas(64) std::array<float, 512> residual;
   test::Random random(3);
@@ -56,7 +59,7 @@ TEST_P(KernelSets, AgreeWithTheBaseline) {
   const auto k = kernelConstants<float>({.kappa = GetParam()});
   const auto sets = runnableKernels();
   ASSERT_STREQ(sets.back()->name, "baseline");
-  for (const LineForm& form : forms(GetParam())) {
+  for (const BrickForm& form : forms(GetParam())) {
     const Pass expected = run(*sets.back(), form, k);
     for (const BrickKernels* set : sets) {
       const Pass pass = run(*set, form, k);
@@ -74,7 +77,7 @@ INSTANTIATE_TEST_SUITE_P(Kappas, KernelSets, testing::Values(-30.0f, 2.0f, 5.0f)
 
 TEST(BrickKernels, AddIsForwardWithoutItsTape) {
   const auto k = kernelConstants<float>(Kernel{});
-  for (const LineForm& form : forms(Kernel{}.kappa)) {
+  for (const BrickForm& form : forms(Kernel{}.kappa)) {
     const Pass pass = run(brickKernels(), form, k);
     alignas(64) std::array<float, 512> sum{};
     brickKernels().add(form, kCorner.data(), k, sum.data());
@@ -95,7 +98,7 @@ TEST(BrickKernels, PlacesAtVoxelsHaveTheirValues) {
   const auto placeKernels = runnablePlaceKernels();
   ASSERT_EQ(placeKernels.size(), sets.size());
   for (std::size_t set = 0; set < sets.size(); ++set)
-    for (const LineForm& form : forms(Kernel{}.kappa)) {
+    for (const BrickForm& form : forms(Kernel{}.kappa)) {
       alignas(64) std::array<float, 512> expected{}, sum{};
       sets[set]->add(form, kCorner.data(), k, expected.data());
       placeKernels[set](form, kCorner.data(), k, places, sum.data());
@@ -111,7 +114,7 @@ TEST(BrickKernels, ATapeGivesTheSameWithoutTheShape) {
   test::Random random(3);
   for (float& r : residual) r = float(random(-1.0, 1.0));
   for (const BrickKernels* set : runnableKernels())
-    for (const LineForm& form : forms(Kernel{}.kappa)) {
+    for (const BrickForm& form : forms(Kernel{}.kappa)) {
       alignas(64) std::array<float, 512> expected{}, sum{};
       PairTape tape{};
       tape.phi = phi.data();
@@ -125,6 +128,75 @@ TEST(BrickKernels, ATapeGivesTheSameWithoutTheShape) {
       EXPECT_NEAR(projection.rPhi, moments.rPhi, kRounding) << set->name;
       EXPECT_NEAR(projection.phi2, moments.phi2, kRounding * moments.phi2) << set->name;
     }
+}
+
+// A vector that the rows leave out contributes nothing, however thin, long or steep the ellipsoid is,
+// and a row that is visited is mostly not empty.
+TEST(BrickKernels, RowsAreThoseThatTheSupportMeets) {
+  const Field field =
+      test::randomField({.count = 400, .extent = 24, .smallest = 0.05, .aspect = 1000});
+  const auto k = kernelConstants<double>(Kernel{});
+  const Ellipsoids& e = field.chunks[0].ellipsoids;
+  for (const BrickKernels* set : runnableKernels()) {
+    int visited = 0, empty = 0;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      const Matrix3 L = unitFrame(e, i);
+      const BrickForm form =
+          makeBrickForm({e.center[0][i], e.center[1][i], e.center[2][i]}, L, supportRadius(k), 1.0);
+      alignas(64) std::array<float, 512> sum{}, phi{};
+      PairTape tape{};
+      tape.phi = phi.data();
+      set->forward(form, kCorner.data(), kernelConstants<float>(Kernel{}), sum.data(), tape);
+      for (int v = 0; v < 512; ++v) {
+        const Coord local = voxelLocal(v);
+        double m = 0.0;
+        for (std::size_t r = 0; r < 3; ++r)
+          m += std::pow(L[3 * r] * (8.0 + local.x - e.center[0][i]) +
+                            L[3 * r + 1] * (8.0 + local.y - e.center[1][i]) +
+                            L[3 * r + 2] * (8.0 + local.z - e.center[2][i]),
+                        2);
+        ASSERT_NEAR(double(sum[v]), kernelPhi(k, m), 1e-3) << set->name << " " << i;
+      }
+      const int lanes = tape.rows ? tape.floats / std::popcount(tape.rows) : 8;
+      for (int first = 0; first < tape.floats; first += lanes, ++visited)
+        empty += std::all_of(&phi[first], &phi[first] + lanes, [](float p) { return p == 0.0f; });
+    }
+    EXPECT_GT(visited, 1000);
+    EXPECT_LT(empty, visited / 5) << set->name;
+  }
+}
+
+// Residuals start at -target, and sums are clamped to the range, also if it has no ends.
+TEST(BrickKernels, ResidualsAreClamped) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  alignas(64) std::array<float, 512> target, r;
+  test::Random random(4);
+  for (float& t : target) t = float(random(0.0, 1.0));
+  for (const BrickKernels* set : runnableKernels())
+    for (const float end : {0.5f, kInfinity}) {
+      set->start(target.data(), r.data());
+      for (int v = 0; v < 512; ++v) r[v] += float(v) / 256.0f - 0.5f;
+      double squares = 0.0;
+      const double sum = set->finish(target.data(), -0.25f, end, r.data());
+      for (int v = 0; v < 512; ++v) {
+        const float value = std::clamp(float(v) / 256.0f - 0.5f, -0.25f, end);
+        ASSERT_NEAR(r[v], value - target[v], 3e-7f) << set->name;
+        squares += double(r[v]) * double(r[v]);
+      }
+      EXPECT_NEAR(sum, squares, 1e-5 * squares);
+    }
+}
+
+TEST(BrickKernels, MomentsAreSummedInFloat64) {
+  std::vector<PairMoments> moments(1000);
+  for (PairMoments& m : moments) m = {1e8f, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1.0f};
+  moments[0].w0x = 1.0f;
+  for (const BrickKernels* set : runnableKernels()) {
+    MomentTotals sums;
+    set->sumMoments(moments.data(), moments.size(), sums);
+    EXPECT_EQ(sums.front(), 999e8 + 1.0) << set->name;
+    EXPECT_EQ(sums.back(), 1000.0) << set->name;
+  }
 }
 
 // The loops of SSIM.

@@ -1,6 +1,7 @@
 // Plan: the pairs over the bricks of an index are those found by testing every brick against every
 // support, in the order of the bricks' coordinates, for supports that are smaller and larger than
 // the index. More pairs than 32 bits can number are refused.
+// One walk that also finds the bricks of the index gives the same lists.
 // forEachReachedBrick visits the bricks that a test of every brick of the bounding box finds,
 // in the same order, for balls, thin and flat ellipsoids of all directions. Supports with NaN have
 // no bricks, supports beyond the index space are cut off, and upper bounds of counts hold.
@@ -151,6 +152,26 @@ TEST(BrickPairs, AreThoseOfEveryBrickWithEverySupport) {
   for (const double smallest : {2.0, 300.0, 1e6})
     expectAllPairs(bricks, supports(test::randomField(
                                {.count = 20, .extent = 500.0, .smallest = smallest, .aspect = 5})));
+}
+
+// One walk appends the bricks that an index misses, in increasing order, and lists all pairs.
+TEST(BrickPairs, OfAllBricksAreThoseOfAnIndexThatHasThem) {
+  const auto reach =
+      supports(test::randomField({.count = 300, .extent = 60.0, .smallest = 1.0, .aspect = 10}));
+  const SupportOf supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
+  const std::vector<Coord> some{{3, 2, 1}, {0, 0, 0}, {90, 0, 0}, {2, 2, 2}};
+  for (const auto& known : {some, std::vector<Coord>{}})
+    for (const Box& within : {kAll, Box{{1, 1, 1}, {5, 4, 6}}}) {
+      BrickIndex expectedIndex(known), index(known);
+      expectedIndex.append(missingBricks(expectedIndex, reach.size(), supportOf, within));
+      const BrickPairs expected = pairsWithin(expectedIndex, reach.size(), supportOf);
+      const BrickPairs pairs = pairsOfAll(index, reach.size(), supportOf, within);
+      EXPECT_EQ(index.bricks(), expectedIndex.bricks());
+      EXPECT_EQ(pairs.brickBegin, expected.brickBegin);
+      EXPECT_EQ(pairs.ellipsoid, expected.ellipsoid);
+      EXPECT_EQ(pairs.ellipsoidBegin, expected.ellipsoidBegin);
+      EXPECT_EQ(pairs.pairOf, expected.pairOf);
+    }
 }
 
 TEST(BrickPairs, OffsetsBeyond32BitsAreRefusedByTheirNumber) {

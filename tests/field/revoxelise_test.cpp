@@ -2,13 +2,14 @@
 // thresholds and bands, and revoxelise() applies it. The voxels of a box in a brick are compared with a
 // test of every voxel, for boxes that cut through it, miss it, contain it, are empty, or end at the
 // limits of 32-bit integers. The region of a brick is compared with its definition for all combinations
-// of box, bricks and masks.
+// of box, bricks and masks, and voxels that are always active are, also where no ellipsoid is.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <vector>
 
+#include "field/random_field.h"
 #include "field/voxel_rule.h"
 
 namespace esvr {
@@ -87,47 +88,41 @@ TEST(ActiveRegion, IsThatOfTheBoxTheBricksAndTheMasks) {
 
   const RevoxeliseOptions inBox{.box = box};
   EXPECT_EQ(regionIn(inBox, bricks[0]).within, maskByVoxels(box, bricks[0]));
-  EXPECT_TRUE(regionIn(inBox, bricks[0]).byValue);
+  EXPECT_EQ(regionIn(inBox, bricks[0]).certain.count(), 0);
 
   const RevoxeliseOptions inBricks{.bricks = bricks, .restrictToBricks = true};
   EXPECT_EQ(regionIn(inBricks, bricks[0]).within.count(), kBrickVoxels);
-  EXPECT_TRUE(regionIn(inBricks, bricks[0]).byValue);
+  EXPECT_EQ(regionIn(inBricks, bricks[0]).certain.count(), 0);
   EXPECT_EQ(regionIn(inBricks, elsewhere).within.count(), 0);
 
   const RevoxeliseOptions masked{
       .bricks = bricks, .restrictToBricks = true, .masks = masks, .box = box};
   EXPECT_EQ(regionIn(masked, bricks[0]).within, maskByVoxels(box, bricks[0]));
   EXPECT_EQ(regionIn(masked, bricks[1]).within, masks[1]);
-  EXPECT_FALSE(regionIn(masked, bricks[1]).byValue);
+  EXPECT_EQ(regionIn(masked, bricks[1]).certain, masks[1]);
   EXPECT_EQ(regionIn(masked, elsewhere).within.count(), 0);
 }
 
-TEST(ActiveRegion, EachBlockHasTheThresholdOfItsLevel) {
-  const std::vector<Coord> bricks{{0, 0, 0}, {8, 0, 0}};
-  std::vector<BlockLevels> levels(2);
-  levels[0].of = {0, 4, 8, 12, 16, 20, 24, 28};  // thresholds 0.25, 0.5, 1, ..., 32
-  levels[1].of.fill(0);
-  const RevoxeliseOptions options{
-      .threshold = 0.25f, .bricks = bricks, .restrictToBricks = true, .levels = levels};
-  const VoxelRule rule = makeVoxelRule(0.0f, options);
-  for (const float value : {0.25f, 0.75f, -3.0f, 40.0f}) {
-    std::vector<float> values(kBrickVoxels, value);
-    const BrickMask active = settle(rule, regionIn(options, bricks[0]), values);
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const bool expected = std::abs(value) > std::ldexp(0.25f, blockOf(v));
-      EXPECT_EQ(active.test(v), expected) << value << ", " << v;
-      EXPECT_EQ(values[std::size_t(v)], expected ? value : 0.0f);
-    }
-  }
-  std::vector<float> values(kBrickVoxels, 0.3f);
-  EXPECT_EQ(settle(rule, regionIn(options, bricks[1]), values).count(), kBrickVoxels);
-  EXPECT_EQ(settle(rule, regionIn(options, {0, 8, 0}), values).count(), 0);
+// One voxel lies where no ellipsoid reaches, one outside the box.
+TEST(ActiveRegion, SomeVoxelsAreAlwaysActive) {
+  const std::vector<Coord> always{{-40, 3, 9}, {1, 0, 0}, {9, 0, 0}};
+  RevoxeliseOptions options{
+      .threshold = 100.0f, .box = {{-40, -40, -40}, {8, 40, 40}}, .alwaysActive = always};
+  const Field field = test::randomField({.count = 20, .extent = 30.0});
+  const SparseVolume volume = revoxelise(field, options);
+  EXPECT_EQ(activeVoxelCount(volume), 2u);
+  EXPECT_EQ(activeBox(volume), (Box{{-40, 0, 0}, {1, 3, 9}}));
+  EXPECT_EQ(valueAt(volume, always[0]), field.background);
+  options.threshold = -1.0f;
+  options.alwaysActive = {};
+  EXPECT_EQ(valueAt(volume, always[1]), valueAt(revoxelise(field, options), always[1]));
 }
 
 // A mask makes voxels active whose values are the background, and no others.
 TEST(ActiveRegion, VoxelsOfAMaskAreActiveWhateverTheirValues) {
-  BrickRegion region{{}, false};
+  BrickRegion region;
   region.within.set(0), region.within.set(1);
+  region.certain = region.within;
   std::vector<float> values(kBrickVoxels, 1.0f);
   values[0] = 0.25f;
   const VoxelRule rule{.background = 0.25f, .threshold = 0.5f};
@@ -135,7 +130,7 @@ TEST(ActiveRegion, VoxelsOfAMaskAreActiveWhateverTheirValues) {
   EXPECT_EQ(values[0], 0.25f);
   EXPECT_EQ(values[1], 1.0f);
   EXPECT_EQ(values[2], 0.25f);
-  region.byValue = true;
+  region.certain = {};
   values.assign(kBrickVoxels, 1.0f);
   values[0] = 0.5f;
   const BrickMask active = settle(rule, region, values);

@@ -65,6 +65,29 @@ TEST_P(OptimiserOn, ManyIterationsInACallAreThoseOfManyCalls) {
   EXPECT_EQ(inOne->measure().squaredSum, inMany->measure().squaredSum);
 }
 
+// The errors of a curve come from the pass of the iteration that follows, if the device can share it.
+TEST_P(OptimiserOn, MeasuringBeforeAnIterationIsMeasuring) {
+  const auto shared = make(), apart = make();
+  for (const auto& optimiser : {shared.get(), apart.get()}) optimiser->growTo(40);
+  for (int event = 0; event < 3; ++event) {
+    const FitErrors found = shared->measureBeforeIteration(), expected = apart->measure();
+    EXPECT_DOUBLE_EQ(found.squaredSum, expected.squaredSum);
+    EXPECT_DOUBLE_EQ(found.squaredSumBox, expected.squaredSumBox);
+    EXPECT_DOUBLE_EQ(found.squaredSumActive, expected.squaredSumActive);
+    EXPECT_EQ(found.largest, expected.largest);
+    EXPECT_EQ(shared->iterate(std::array{1.0, 1.0}), apart->iterate(std::array{1.0, 1.0}));
+    // What changes the ellipsoids must not use the gradients of before.
+    (void)shared->measureBeforeIteration();
+    (void)apart->measure();
+    for (const auto& optimiser : {shared.get(), apart.get()}) {
+      optimiser->iterate(std::array{0.0});
+      optimiser->relocate(5);
+      optimiser->setKappa(0.6f + 0.1f * float(event));
+    }
+  }
+  EXPECT_EQ(shared->measure().squaredSum, apart->measure().squaredSum);
+}
+
 // The lists are built anew, so that the steps are not quite the same.
 TEST_P(OptimiserOn, ContinuesFromItsState) {
   const std::vector<double> factors(20, 1.0), half(10, 1.0);

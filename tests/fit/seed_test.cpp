@@ -1,9 +1,10 @@
-// Plan: voxels are sampled in proportion to the squared residual of the allowed signs only. The
+// Plan: errors are counted in the box and at the active voxels. Voxels are sampled in proportion to the squared residual of the allowed signs only. The
 // center, the covariance and the height of a seed follow from the residual around it. In the
 // Gaussian limit the kernel's moments have closed forms; a harder kernel is wider.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -55,6 +56,34 @@ TEST(DrawVoxels, AVoxelOfManySharesIsDrawnOnce) {
 TEST(DrawVoxels, FindsNothingWhereThereIsNoError) {
   const Bricks b({{0, 0, 0}});
   EXPECT_TRUE(sampleVoxels(b.field(), {.count = 5, .targetBricks = 1}).voxels.empty());
+}
+
+// The first brick crosses the border of the box, the second is outside the target.
+TEST(Errors, AreThoseOfEachVoxel) {
+  Bricks b({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  for (std::size_t v = 0; v < b.values.size(); ++v) b.values[v] = float(int(v * 7919 % 1001) - 500);
+  std::vector<BrickMask> active(2);
+  for (int v = 0; v < kBrickVoxels; v += 3) active[0].set(v);
+  active[1].setAll();
+  FitTarget target;
+  target.bricks = {{0, 0, 0}, {1, 0, 0}};
+  target.active = &active;
+  target.box = {{2, 0, 0}, {15, 7, 7}};
+  const FitErrors errors = errorsOf(target, b.field());
+  FitErrors expected;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const double r = double(b.values[i * kBrickVoxels + std::size_t(v)]);
+      expected.squaredSum += r * r;
+      if (target.box.contains(b.index.bricks()[i] * kBrickSide + voxelLocal(v)))
+        expected.squaredSumBox += r * r;
+      if (i < 2 && active[i].test(v)) expected.squaredSumActive += r * r;
+      expected.largest = std::max(expected.largest, std::abs(r));
+    }
+  EXPECT_EQ(errors.squaredSum, expected.squaredSum);  // sums of integers are exact
+  EXPECT_EQ(errors.squaredSumBox, expected.squaredSumBox);
+  EXPECT_EQ(errors.squaredSumActive, expected.squaredSumActive);
+  EXPECT_EQ(errors.largest, expected.largest);
 }
 
 TEST(Seed, TakesPlaceAndHeightFromTheResidual) {

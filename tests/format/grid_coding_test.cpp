@@ -1,7 +1,8 @@
 // Plan: sources are made from fields whose voxels are known. The same field with its threshold
 // gives the same voxels. A different field gives the best overlap that an exhaustive search over
-// all thresholds finds, and no threshold that increases the squared error. Level sets give their
-// band and their inside, and grids without contrast give their bricks.
+// all thresholds finds, and no threshold that increases the squared error. The active box is always
+// that of the source. Level sets give their band and their inside, and grids without contrast give
+// their bricks.
 
 #include "esvr/grid_coding.h"
 
@@ -113,7 +114,7 @@ TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
 TEST(GridCoding, TheThresholdOverlapsAsWellAsTheBestOfManyThatCostNoError) {
   const Field truth = positiveField(3);
   const SparseVolume source = revoxelise(truth, {.threshold = 0.2f});
-  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth), {Activity::kByValue});
+  const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth), Activity::kByValue);
   const double mseOfAll = decodedAt(grid, source, 0.0f).mseBox;
 
   double bestIou = 0.0;
@@ -138,7 +139,7 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
 
   const auto thresholdOf = [](const Field& field, float cut) {
     return makeStoredGrid(kFog, revoxelise(field, {.threshold = cut}), perturbed(field),
-                          {Activity::kByValue})
+                          Activity::kByValue)
         .activeThreshold;
   };
   const float threshold = thresholdOf(here, 0.1f);
@@ -232,7 +233,7 @@ TEST(GridCoding, TheMaskComesBackBitForBitWhereItIsStored) {
   SparseVolume source = revoxelise(field, {.threshold = 0.01f});
   // The mask has holes that no threshold finds, and a voxel that no ellipsoid reaches.
   for (auto& mask : source.active) mask.words[3] &= 0x5555555555555555;
-  const StoredGrid grid = makeStoredGrid(kFog, source, field, {Activity::kExact});
+  const StoredGrid grid = makeStoredGrid(kFog, source, field, Activity::kExact);
   EXPECT_EQ(grid.topology, TopologyKind::kMask);
   const auto bytes = encodeEsvr({{}, {grid}});
   const EsvrFile stored = decodeEsvr(bytes, "memory");
@@ -260,37 +261,89 @@ TEST(GridCoding, NoVoxelOutsideTheActiveBoxIsActive) {
     source = revoxelise(field, {.threshold = 0.05f, .box = {all.min, half}});
     ASSERT_EQ(activeBox(source).max.z, half.z);
     ASSERT_FALSE(staysWithin(revoxelise(field, {.threshold = 0.05f}), source));
-    for (const auto activity : {Activity::kAuto, Activity::kByValue, Activity::kExact}) {
-      const StoredGrid grid = makeStoredGrid(kFog, source, field, {activity});
+    for (const auto activity : {Activity::kByValue, Activity::kExact}) {
+      const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
       expectSame(decodeGrid(grid), source);
     }
   }
 }
 
-TEST(GridCoding, TheOverlapSufficesWhateverTheFit) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const Field truth = positiveField(seed);
+// With the high thresholds, hardly a voxel is left; without ellipsoids, none but those of the box.
+TEST(GridCoding, TheActiveBoxIsThatOfTheSourceWhateverTheFit) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Coord origin{std::int32_t(seed) * 1'000'000, -7, 30'000};
+    const Field truth = positiveField(seed, origin);
     for (const float threshold : {0.0f, 0.003f, 0.2f}) {
       const SparseVolume source = revoxelise(truth, {.threshold = threshold});
-      const StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth));
-      const EsvrFile stored = decodeEsvr(encodeEsvr({{}, {grid}}), "memory");
-      const SparseVolume decoded = decodeGrid(stored.grids[0]);
-      EXPECT_GT(compareVolumes(source, decoded).iou, kMinOverlap) << seed << ", " << threshold;
-      EXPECT_TRUE(staysWithin(decoded, source)) << seed << ", " << threshold;
+      StoredGrid grid = makeStoredGrid(kFog, source, perturbed(truth));
+      EXPECT_LE(grid.boxVoxels.size(), kMostBoxVoxels);
+      for (const float stored : {grid.activeThreshold, 1.0f, 100.0f}) {
+        grid.activeThreshold = stored;
+        const EsvrFile read = decodeEsvr(encodeEsvr({{}, {grid}}), "memory");
+        EXPECT_EQ(activeBox(decodeGrid(read.grids[0])), activeBox(source)) << seed << ' ' << stored;
+      }
+      grid.field.chunks.clear();
+      EXPECT_EQ(activeBox(decodeGrid(grid)), activeBox(source)) << seed;
     }
   }
 }
 
-TEST(GridCoding, ASimplifiedMaskTakesFewerBytesThanTheExactOne) {
+TEST(GridCoding, ABandKeepsItsActiveBox) {
+  const Field field = ball();
+  const SparseVolume source = revoxelise(field, {.threshold = 0.25f, .narrowBand = true});
+  StoredGrid grid = makeStoredGrid(kLevelSet, source, field);
+  ASSERT_EQ(grid.topology, TopologyKind::kBricks);
+  grid.activeThreshold = 2.9f;
+  EXPECT_EQ(activeBox(decodeGrid(grid)), activeBox(source));
+}
+
+TEST(GridCoding, BoxVoxelsHaveTheValuesOfTheSum) {
+  const Field field = positiveField(3);
+  const SparseVolume source = revoxelise(field, {.threshold = 0.0f});
+  StoredGrid grid = makeStoredGrid(kFog, source, field);
+  grid.activeThreshold = 1000.0f;
+  const SparseVolume decoded = decodeGrid(grid);
+  EXPECT_EQ(activeVoxelCount(decoded), grid.boxVoxels.size());
+  for (const Coord voxel : grid.boxVoxels)
+    EXPECT_EQ(valueAt(decoded, voxel), valueAt(source, voxel)) << toString(voxel);
+}
+
+TEST(GridCoding, APartHasTheBoxVoxelsWithinIt) {
+  const Field field = positiveField(3);
+  StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {}), field);
+  grid.activeThreshold = 1000.0f;
+  for (const Coord voxel : grid.boxVoxels) {
+    const SparseVolume part = decodeGrid(grid, {.box = Box{voxel, voxel}});
+    EXPECT_EQ(activeBox(part), (Box{voxel, voxel}));
+  }
+}
+
+TEST(GridCoding, BoxVoxelsThatAreImpossibleAreRefused) {
+  const Field field = positiveField(3);
+  const StoredGrid good = makeStoredGrid(kFog, revoxelise(field, {}), field);
+  const Box box = good.activeBox;
+  StoredGrid outside = good, unsorted = good, many = good, masked = good;
+  outside.boxVoxels = {box.min - Coord{1, 0, 0}};
+  unsorted.boxVoxels = {box.max, box.min};
+  many.boxVoxels.clear();
+  for (int n = 0; n < 7; ++n) many.boxVoxels.push_back(box.min + Coord{0, 0, n});
+  masked = makeStoredGrid(kFog, revoxelise(field, {}), field, Activity::kExact);
+  masked.boxVoxels = good.boxVoxels;
+  EXPECT_NO_THROW((void)encodeEsvr({{}, {good}}));
+  for (const StoredGrid* grid : {&outside, &unsorted, &many, &masked})
+    EXPECT_THROW((void)encodeEsvr({{}, {*grid}}), RuntimeFailure);
+}
+
+TEST(GridCoding, AThresholdTakesFewerBytesThanAMask) {
   const Field field = positiveField(3);
   const SparseVolume source = revoxelise(field, {.threshold = 0.001f});
   const auto bytesOf = [&](Activity activity) {
-    return bytesAdded(makeStoredGrid(kFog, source, perturbed(field), {activity}));
+    return bytesAdded(makeStoredGrid(kFog, source, perturbed(field), activity));
   };
-  EXPECT_LT(bytesOf(Activity::kAuto), bytesOf(Activity::kExact));
+  EXPECT_LT(bytesOf(Activity::kByValue) + 300, bytesOf(Activity::kExact));
 }
 
-TEST(GridCoding, ASimplifiedMaskOfOneVoxelIsThatVoxel) {
+TEST(GridCoding, AVoxelThatNoEllipsoidReachesIsStored) {
   Field nothing;
   const SparseVolume source = oneBrick(2.0f, firstVoxels(1));
   const SparseVolume decoded = decodeGrid(makeStoredGrid(kFog, source, nothing));
@@ -300,7 +353,8 @@ TEST(GridCoding, ASimplifiedMaskOfOneVoxelIsThatVoxel) {
 
 TEST(GridCoding, APartOfAMaskIsDecodedAsInTheWhole) {
   const Field field = positiveField(5);
-  const StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field));
+  const StoredGrid grid =
+      makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field), Activity::kExact);
   ASSERT_EQ(grid.topology, TopologyKind::kMask);
   const Box all = grid.activeBox, box{all.min + Coord{3, 3, 3}, all.max - Coord{9, 5, 3}};
   RevoxeliseOptions rule = voxelRule(grid);
@@ -312,7 +366,7 @@ TEST(GridCoding, ALevelSetsMaskComesBackWithItsInside) {
   const Field field = ball();
   const SparseVolume source = revoxelise(field, {.threshold = 0.25f, .narrowBand = true});
   const SparseVolume decoded =
-      decodeGrid(makeStoredGrid(kLevelSet, source, field, {Activity::kExact}));
+      decodeGrid(makeStoredGrid(kLevelSet, source, field, Activity::kExact));
   expectSame(source, decoded);
 }
 
@@ -321,8 +375,8 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
   const SparseVolume source = revoxelise(field, {.threshold = 0.01f});
   const Box all = activeBox(source);
   const Box box{all.min, {all.max.x, (all.min.y + all.max.y) / 2, all.max.z}};
-  for (const auto activity : {Activity::kAuto, Activity::kByValue, Activity::kExact}) {
-    const StoredGrid grid = makeStoredGrid(kFog, source, field, {activity});
+  for (const auto activity : {Activity::kByValue, Activity::kExact}) {
+    const StoredGrid grid = makeStoredGrid(kFog, source, field, activity);
     const SparseVolume whole = decodeGrid(grid), part = decodeGrid(grid, {.box = box});
     EXPECT_LT(activeVoxelCount(part), activeVoxelCount(whole));
     for (Coord v = all.min; v.y <= all.max.y; ++v.y)
@@ -332,14 +386,13 @@ TEST(GridCoding, ABoxLeavesTheVoxelsOutsideInactive) {
 
 TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
   const auto expectDecoded = [](const Field& field, Activity activity, TopologyKind kind) {
-    const StoredGrid grid =
-        makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field), {activity});
+    const StoredGrid grid = makeStoredGrid(kFog, revoxelise(field, {}), perturbed(field), activity);
     EXPECT_EQ(grid.topology, kind);
     expectSame(decodeGrid(grid), revoxelise(grid.field, voxelRule(grid)));
   };
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     expectDecoded(positiveField(seed), Activity::kByValue, TopologyKind::kThreshold);
-    expectDecoded(positiveField(seed), Activity::kAuto, TopologyKind::kMask);
+    expectDecoded(positiveField(seed), Activity::kExact, TopologyKind::kMask);
   }
   expectDecoded(test::randomField({.count = 20, .extent = 30.0}), Activity::kByValue,
                 TopologyKind::kThreshold);

@@ -191,6 +191,8 @@ const ContentLie kContentLies[] = {
     {"UnknownClass", pokeGrid(at::kClass, kNoEnumerator), "unknown grid class 200"},
     {"UnknownValueType", pokeGrid(at::kValueType, kNoEnumerator), "unknown value type"},
     {"UnknownTopology", pokeGrid(at::kTopology, kNoEnumerator), "unknown topology"},
+    {"TopologyOfNoVersion", pokeGrid(at::kTopology, std::uint8_t{3}), "unknown topology 3"},
+    {"NoBoxVoxels", pokeGrid(at::kTopology, std::uint8_t{9}), "box voxels without any"},
     {"UnknownKernel", pokeGrid(at::kKernel, kNoEnumerator), "unknown kernel"},
     {"AffineNeitherNor", pokeGrid(at::kAffine, kNoEnumerator), "unknown mark of an affine"},
     {"WithinRangeNeitherNor", pokeGrid(at::kWithinRange, kNoEnumerator), "unknown mark"},

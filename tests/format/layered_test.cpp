@@ -10,8 +10,8 @@
 #include <filesystem>
 #include <string>
 
-#include "esvr/compact.h"
 #include "esvr/container.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"

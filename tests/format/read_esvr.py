@@ -20,7 +20,7 @@ KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer erro
          7: "curve", 8: "carried grid", 9: "vector grid", 11: "grid records",
          12: "packed sections", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
-         37: "residual", 38: "carried bytes", 41: "related voxels", 43: "levels",
+         37: "residual", 38: "carried bytes", 41: "related voxels",
          64: "sequence index"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
@@ -107,9 +107,14 @@ def grid(data):
     g["affine"] = r.get("16d") if r.get("B") else None
     g["metadata"] = r.metadata()
     for key, form in (("topology", "B"), ("within range", "B"), ("threshold", "f"),
-                      ("active box", "6i"), ("active voxels", "Q"), ("range", "2f"),
-                      ("field background", "f"), ("kernel", "B"), ("kappa", "f"),
-                      ("epsilon", "f"), ("chunk count", "I")):
+                      ("active box", "6i")):
+        g[key] = r.get(form)
+    if g["topology"] & 8:
+        g["box voxels"] = [tuple(low + r.varint() for low in g["active box"][:3])
+                           for _ in range(r.get("B"))]
+        assert 1 <= len(g["box voxels"]) <= 6 and sorted(g["box voxels"]) == g["box voxels"]
+    for key, form in (("active voxels", "Q"), ("range", "2f"), ("field background", "f"),
+                      ("kernel", "B"), ("kappa", "f"), ("epsilon", "f"), ("chunk count", "I")):
         g[key] = r.get(form)
     g["chunks"] = [r.chunk()] if g["chunk count"] == 1 else []
     r.end()
@@ -405,15 +410,107 @@ def curve(data):
     return list(zip(*columns))
 
 
-def toward_zero(value, divisor):
-    return abs(value) // divisor * (1 if value >= 0 else -1)
+def signed(n):
+    """A number modulo 2^32, from -2^31 to 2^31 - 1."""
+    return (n + (1 << 31)) % (1 << 32) - (1 << 31)
+
+
+def third(n):
+    return signed(21 * n + 32) >> 6
+
+
+def half(n):
+    return signed(n - (n >> 31)) >> 1
 
 
 def guesses(a, b, c, ab, ac, bc, abc):
-    lorenzo = a + b + c - ab - ac - bc + abc
-    return (clamp(lorenzo, min(a, b, c), max(a, b, c)), toward_zero(a + b + c, 3),
-            toward_zero(2 * (a + b + c) - ab - ac - bc, 3),
-            c + toward_zero(b - bc + a - ac, 2), lorenzo)
+    """The predictions of a voxel by the six rules."""
+    corner = signed(a + b - ab - ac - bc + abc)
+    return (clamp(signed(c + corner), min(a, b, c), max(a, b, c)),
+            signed(c + third(signed(a + b - 2 * c))),
+            signed(c + third(signed(2 * (a + b) - ab - ac - bc - c))),
+            signed(c + half(signed(a + b - ac - bc))), signed(c + corner), c)
+
+
+class Symbols:
+    """Decodes a stream of the symbol coder."""
+
+    LEAST = (1 << 14) + (1 << 8)
+    FREE = (1 << 30) - 16 * LEAST
+
+    def __init__(self, data):
+        self.data, self.at, self.state, self.models = data, 0, 0, {}
+        self.begin_part()
+
+    def word(self):
+        self.at += 4
+        return int.from_bytes(self.data[self.at - 4:self.at], "little")
+
+    def begin_part(self):
+        self.state = self.word() << 32
+        self.state |= self.word()
+
+    def take(self, start, share):
+        place = self.state & 0xFFFF
+        self.state = (share * (self.state >> 16) + place - start) % (1 << 64)
+        if self.state < 1 << 31:
+            self.state = self.state << 32 | self.word()
+
+    def decision(self, *model):
+        p, n = self.models.get(model, (1 << 21, 0))
+        zero = max(p >> 6, 1)
+        one = self.state & 0xFFFF >= zero
+        self.take(zero if one else 0, (1 << 16) - zero if one else zero)
+        share = (1 << 17) // (2 * n + 3)
+        p += -(p * share >> 16) if one else ((1 << 22) - 1 - p) * share >> 16
+        self.models[model] = p, min(n + 1, 99)
+        return int(one)
+
+    def symbol(self, *model, count=16):
+        starts, n = self.models.get(model) or (
+            [s * self.LEAST + min(s, count) * (self.FREE // count) for s in range(16)], 0)
+        place = self.state & 0xFFFF
+        s = max(k for k in range(16) if starts[k] >> 14 <= place)
+        end = starts[s + 1] >> 14 if s < 15 else 1 << 16
+        self.take(starts[s] >> 14, end - (starts[s] >> 14))
+        shift = next(k for k, last in enumerate((2, 4, 9, 20, 41, 82, n + 1), 1) if n < last)
+        for k in range(16):
+            target = k * self.LEAST + (self.FREE if k > s else 0)
+            starts[k] += (target - starts[k]) >> shift
+        self.models[model] = starts, n + 1
+        if s >= count:
+            raise ValueError("a symbol that does not occur")
+        return s
+
+    def raw(self, bits):
+        value = (self.state & 0xFFFF) >> (16 - bits)
+        self.take(value << (16 - bits), 1 << (16 - bits))
+        return value
+
+    def difference(self, base, *model):
+        def bits_of(size):
+            return (base + 1 if base else 0) if size == 1 else base + size - 1
+
+        symbol = self.symbol("size", *model)
+        negative, size = symbol % 2 == 0, (symbol + 1) // 2
+        if symbol == 0:
+            return 0
+        if symbol == 15:
+            size = 8 + self.symbol("large")
+            if size == 8 + 15:
+                size += self.raw(4)
+            negative = self.decision("large negative")
+        value, bits = 0 if size == 1 and base else 1, bits_of(size)
+        if bits > 0:
+            lead = min(bits, 4)
+            value = value << lead | self.symbol(
+                "lead", min(size, 8), *model, count=1 << min(bits_of(min(size, 8)), 4))
+            bits -= lead
+        while bits > 0:
+            now = min(bits, 16)
+            bits -= now
+            value = value << now | self.raw(now)
+        return -value if negative else value
 
 
 def header_of_voxels(r):
@@ -425,13 +522,16 @@ def header_of_voxels(r):
     return head
 
 
-class Voxels:
-    """The voxels of a grid that have been read so far."""
+class Block:
+    """The voxels of a block that have been read so far."""
+
+    LINE = range(-1, 8)
 
     def __init__(self, head, stream, mirrors, common):
         self.head, self.stream, self.mirrors, self.common = head, stream, mirrors, common
-        self.codes, self.active, self.held = {}, set(), {}
-        self.kept, self.copies, self.source = set(), {}, 0
+        self.codes, self.active, self.kept, self.copies = {}, set(), set(), set()
+        self.source = self.vacancy = self.flat = self.bricks = 0
+        self.errors, self.image_error = [0] * 6, 0
 
     def code(self, p):
         return self.codes.get(p, self.head["vacant"])
@@ -443,54 +543,148 @@ class Voxels:
                 return tuple(mirror - c if a == axis else c for a, c in enumerate(p))
         return None
 
-    def bricks(self):
-        """Yields the voxels of every brick in order."""
-        for key in keys(self.head["bricks"], 3 * self.head["bits"], self.stream):
-            x, y, z = (8 * sum((key >> (3 * b + a) & 1) << b for b in range(self.head["bits"]))
-                       for a in range(3))
-            yield [(x + (v >> 6), y + (v >> 3 & 7), z + (v & 7)) for v in range(512)]
+    def brick(self, first):
+        x, y, z = first
+        voxels_ = [(x + (v >> 6), y + (v >> 3 & 7), z + (v & 7)) for v in range(512)]
+        if self.copied(first, voxels_):
+            return
+        if self.bricks == 256:
+            self.stream.begin_part()
+            self.bricks = 0
+        self.bricks += 1
+        self.read_activity(first, voxels_)
+        vacant = self.read_vacancy(voxels_)
+        self.codes.update((p, self.head["vacant"]) for p in vacant)
+        self.kept.update(p for p in voxels_ if p not in vacant)
+        if len(vacant) < 512:
+            self.read_codes(first, voxels_, vacant)
 
-    def copied(self, voxels_):
+    def copied(self, first, voxels_):
         """Copies a brick, if it is a copy."""
-        first = voxels_[0]
         before = [tuple(c - 8 * (a == axis) for a, c in enumerate(first)) for axis in range(3)]
-        if not self.stream.decision("copy", *(self.copies.get(q, 0) for q in before)):
+        if not self.stream.decision("copy", *(q in self.copies for q in before)):
             return False
-        self.copies[first] = 1
-        self.source = self.stream.tree(2, "source", self.source)
+        self.copies.add(first)
+        self.source = self.stream.symbol("source", self.source, count=4)
         for p in voxels_:
             q = (self.image(p) if self.source == 3 else
                  tuple(c - 8 * (a == self.source) for a, c in enumerate(p)))
-            if q not in self.kept:
-                self.codes[p] = self.head["vacant"]
-                continue
+            self.codes[p] = self.code(q) if q in self.kept else self.head["vacant"]
+            if q in self.kept:
+                self.kept.add(p)
             if q in self.active:
                 self.active.add(p)
-            self.put(p, self.codes[q])
         return True
 
-    def each(self):
-        """Yields every voxel that is not copied, with its neighbours that come before it."""
-        for voxels_ in self.bricks():
-            if self.copied(voxels_):
+    def read_activity(self, first, voxels_):
+        def is_active(x, y, z):
+            return (first[0] + x, first[1] + y, first[2] + z) in self.active
+
+        def line(x, y):
+            return [is_active(x, y, z) for z in self.LINE]
+
+        sides = [is_active(*p) for m in range(8) for n in range(8) for p in ((-1, m, n), (m, -1, n))]
+        ends = [is_active(m, n, -1) for m in range(8) for n in range(8)]
+        state = any(sides) + all(sides) + 3 * (any(ends) + all(ends))
+        if self.stream.decision("uniform", state):
+            if self.stream.decision("full", state):
+                self.active.update(voxels_)
+            return
+        for x in range(8):
+            for y in range(8):
+                self.read_line(first, voxels_, x, y, line)
+
+    def read_line(self, first, voxels_, x, y, line):
+        around = line(x - 1, y), line(x, y - 1), line(x - 1, y - 1)
+        after, own = line(x - 1, min(y + 1, 7)), line(x, y)
+        here = voxels_[64 * x + 8 * y:64 * x + 8 * y + 8]
+        same = own[0]
+        if all(known == same for known in sum(around, [])):
+            alike = [same] + [all(known == same for known in other[1:]) for other in (
+                after, line(x - 2, y) if x else [same] * 9, line(x, y - 2) if y else [same] * 9)]
+            if not self.stream.decision("line", *alike):
+                self.active.update(here if same else [])
+                return
+        for z, p in enumerate(here):
+            context = [other[z + k] if z + k < 9 else False
+                       for other, count in zip(around, (3, 3, 2)) for k in range(count)]
+            context += [here[z - 1] in self.active if z else own[0], after[z + 1]]
+            image = self.image(p)
+            state = 0 if image is None else 2 if image in self.active else 1
+            if self.stream.decision("active", state, *context):
+                self.active.add(p)
+
+    def read_vacancy(self, voxels_):
+        """The vacant voxels."""
+        others = [p for p in voxels_ if p not in self.active]
+        if not others:
+            return set()
+        self.vacancy = self.stream.symbol("vacancy", self.vacancy, count=3)
+        if self.vacancy < 2:
+            return set(() if self.vacancy else others)
+        vacant, last = set(), 0
+        for p in others:
+            image = self.image(p)
+            state = 0
+            if image:
+                is_vacant = image in vacant or (image not in self.kept and image not in voxels_)
+                state = 1 + (image in self.active) + 2 * is_vacant
+            last = self.stream.decision("vacant", state, last)
+            if last:
+                vacant.add(p)
+        return vacant
+
+    def read_codes(self, first, voxels_, vacant):
+        self.flat = self.stream.decision("flat", self.flat)
+        if self.flat:
+            x, y, z = first
+            code = signed(self.code((x - 1, y, z)) + self.stream.difference(0, "flat"))
+            self.codes.update((p, code) for p in voxels_ if p not in vacant)
+            return
+        for n in range(0, 512, 8):
+            here = voxels_[n:n + 8]
+            if vacant.issuperset(here):
                 continue
-            for x, y, z in voxels_:
-                yield (x, y, z), [(x - 1, y, z), (x, y - 1, z), (x, y, z - 1), (x - 1, y - 1, z),
-                                  (x - 1, y, z - 1), (x, y - 1, z - 1), (x - 1, y - 1, z - 1)]
+            rule, changes = self.errors.index(min(self.errors)), [0] * 6
+            for p in here:
+                if p in vacant:
+                    continue
+                rules = self.read_code(p, rule)
+                for k, guess in enumerate(rules):
+                    distance = abs(signed(self.codes[p] - guess)) & 0x7FFFFFFF
+                    changes[k] += min(distance, 1 << 20)
+            self.errors = [e + change - (e >> 4) for e, change in zip(self.errors, changes)]
 
-    def put(self, p, code):
-        self.codes[p] = code
-        self.kept.add(p)
-        self.held[tuple(o + c for o, c in zip(self.head["origin"], p))] = code, p in self.active
-
-
-def spread_of(a, b, c, ab, ac, bc):
-    return (abs(a - ab) + abs(b - bc) + abs(c - ac) + abs(a - ac) + abs(b - ab) + abs(c - bc))
-
-
-def half_octaves(number, maximum):
-    width = number.bit_length()
-    return min(2 * width + (number >> (width - 2) & 1 if width > 1 else 0), maximum)
+    def read_code(self, p, rule):
+        """Reads a code and returns the predictions that count; none if the code is common."""
+        x, y, z = p
+        a, b, c, ab, ac, bc, abc = codes = [self.code(q) for q in (
+            (x - 1, y, z), (x, y - 1, z), (x, y, z - 1), (x - 1, y - 1, z), (x - 1, y, z - 1),
+            (x, y - 1, z - 1), (x - 1, y - 1, z - 1))]
+        image = self.image(p)
+        if self.common:
+            classes = [1 + self.common.index(n) if n in self.common else 0
+                       for n in ([self.code(image)] if image else codes[:3])]
+            known = self.stream.symbol("class", *classes)
+            if known:
+                self.codes[p] = self.common[known - 1]
+                return []
+        rules = guesses(*codes)
+        if image and self.image_error <= self.errors[rule]:
+            guess, width = self.code(image), min((4 * self.image_error).bit_length(), 30)
+            base, context = max(width - 9, 0), ("image", width)
+        else:
+            guess, pairs = rules[rule], ((a, ab), (b, bc), (c, ac), (a, ac), (b, ab), (c, bc))
+            spread = sum(abs(signed(m - n)) for m, n in pairs) + (self.errors[rule] >> 7)
+            spread %= 1 << 32
+            width = spread.bit_length()
+            base = max(width - 5, 0)
+            context = width, spread >> (width - 2) & 1 if width > 1 else 0
+        self.codes[p] = signed(guess + self.stream.difference(base, *context))
+        if image:
+            distance = min(abs(signed(self.codes[p] - self.code(image))), 1 << 20)
+            self.image_error += distance - (self.image_error >> 4)
+        return rules
 
 
 def voxels(data):
@@ -498,84 +692,20 @@ def voxels(data):
     head = header_of_voxels(r)
     mirrors = r.get("3i")
     common = [r.get("i") for _ in range(r.get("B"))]
-    stream = Decoder(data[r.at:])
-    v = Voxels(head, stream, mirrors, common)
-    errors, negative = [0] * 7, 0
-    for p, before in v.each():
-        image = v.image(p)
-        state = 0 if image is None else 2 if image in v.active else 1
-        around = sum((q in v.active) << (6 - i) for i, q in enumerate(before))
-        if stream.decision("active", around, state):
-            v.active.add(p)
-        elif stream.decision("vacant", image and (state, v.code(image) == head["vacant"])):
-            v.codes[p] = head["vacant"]
-            continue
-        codes = [v.code(q) for q in before]
-        if common:
-            classes = [1 + common.index(c) if c in common else 0
-                       for c in ([v.code(image)] if image else codes[:3])]
-            known = stream.tree(4, "class", *classes)
-            if known:
-                v.put(p, common[known - 1])
-                continue
-        rules = (v.code(image) if image else 0, *guesses(*codes), codes[2])
-        first = 0 if image else 1
-        best = errors.index(min(errors[first:]), first)
-        if best == 0:
-            context = "image", min((errors[best] >> 2).bit_length(), 30)
-        else:
-            context = half_octaves(spread_of(*codes[:6]) + (errors[best] >> 6), 79)
-        far = stream.number("far", context, bits=6)
-        if far:
-            negative = stream.decision("negative", context, negative)
-        code = rules[best] + (-far if negative else far)
-        for k in range(first, 7):
-            errors[k] += 16 * min(abs(code - rules[k]), 1 << 34) - (errors[k] >> 4)
-        v.put(p, code)
-    return head, v.held
-
-
-def difference_(stream):
-    """A signed number: whether it differs from 0, its sign, and its magnitude."""
-    if not stream.decision("differs"):
-        return 0
-    negative, magnitude = stream.decision("negative"), 1
-    while magnitude <= 3 and stream.decision("above", magnitude):
-        magnitude += 1
-    if magnitude > 3:
-        magnitude += stream.number("magnitude", bits=6)
-    return -magnitude if negative else magnitude
-
-
-def level(stream, held, brick, n):
-    """The level of block n of a brick; `held` has those before."""
-    before = []
-    for axis, bit in ((2, 1), (1, 2), (0, 4)):
-        other = tuple(c - (a == axis and not n & bit) for a, c in enumerate(brick))
-        before.append(held.get((other, n ^ bit)))
-    z, y, x = before
-    agreement = (0 if y == x else 1) if z == y else 2 if z == x else 3 if y == x else 4
-    for axis, offer in enumerate(before):
-        if offer is None or offer in before[:axis]:
-            continue
-        if stream.decision("same", n, agreement, axis):
-            return offer
-    known = [offer for offer in before if offer is not None]
-    mean = (sum(known) + len(known) // 2) // len(known) if known else 24
-    return mean + difference_(stream)
-
-
-def levels(data):
-    """The levels of the blocks of bricks: {(brick, block): level}."""
-    origin = struct.unpack_from("<3i", data)
-    stream = Decoder(data[12:])
-    count, held = stream.number("count", bits=6), {}
-    for key in keys(count, 63, stream):
-        brick = tuple(origin[a] + sum((key >> (3 * b + a) & 1) << b for b in range(21))
-                      for a in range(3))
-        for n in range(8):
-            held[brick, n] = level(stream, held, brick, n)
-    return held
+    blocks = 1 if max(mirrors) >= 0 else max(1, -(-head["bricks"] // 2048))
+    sizes = [r.get("I") for _ in range(blocks)]
+    starts = [r.at + sum(sizes[:n]) for n in range(blocks + 1)] + [len(data)]
+    streams = [data[start:end] for start, end in zip(starts, starts[1:])]
+    bricks_ = list(keys(head["bricks"], 3 * head["bits"], Decoder(streams[0])))
+    held = {}
+    for n in range(blocks):
+        block_ = Block(head, Symbols(streams[1 + n]), mirrors, common)
+        for key in bricks_[head["bricks"] * n // blocks:head["bricks"] * (n + 1) // blocks]:
+            block_.brick(tuple(8 * sum((key >> (3 * b + a) & 1) << b for b in range(head["bits"]))
+                               for a in range(3)))
+        held.update((tuple(o + c for o, c in zip(head["origin"], p)),
+                     (block_.codes[p], p in block_.active)) for p in block_.kept)
+    return head, held
 
 
 def carried(data):
@@ -661,7 +791,7 @@ def content(name, data):
                "voxels": voxels, "mask": voxels, "residual": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
                "carried grid": carried, "vector grid": vectors, "grid records": grid_records,
-               "related voxels": related, "levels": levels, "packed sections": packed, "sequence index": sequence_index}
+               "related voxels": related, "packed sections": packed, "sequence index": sequence_index}
     return readers[name](data) if name in readers else data
 
 
@@ -703,7 +833,7 @@ def add(sections, minor, row):
     if name is None:
         assert flags == 0, "an unknown kind is optional here"
         return None
-    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4, 43: 4}.get(kind, 0)
+    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4}.get(kind, 0)
     assert minor >= since, f"a kind of version 1.{since}"
     optional = name in ("curve", "layer errors", "carried grid", "carried bytes", "vector grid")
     assert flags == (0 if optional else 1), "flags"
@@ -721,7 +851,7 @@ def read(data):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert major == 1 and minor in (0, 1, 2, 3, 4) and size == len(data), "version or size"
+    assert major == 1 and minor in (0, 1, 2, 3, 4, 5) and size == len(data), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -856,12 +986,10 @@ def check_mask(sections):
         if z > 2 or (x, y, z) == (-5, 18, 1)}
 
 
-def check_levels(sections):
+def check_box_voxels(sections):
     record = sections["grid", 0, NONE]
-    assert (record["topology"], record["threshold"]) == (3, 0.125)
-    assert sections["levels", 0, NONE] == {
-        ((x, 2, z), n): 8 * z if n == 3 else 47 - n if x == 8 else 20
-        for x in (-1, 0, 8) for z in range(5) for n in range(8)}
+    assert (record["topology"], record["active box"]) == (8, (-100, -24, 0, 300, -9, 2000))
+    assert record["box voxels"] == [(-100, -20, 2000), (7, -9, 5), (300, -24, 0)]
 
 
 def check_residual(sections):
@@ -988,7 +1116,7 @@ def check_sequence(sections):
 
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
-          "voxels": check_voxels, "mask": check_mask, "levels": check_levels, "residual": check_residual,
+          "voxels": check_voxels, "mask": check_mask, "box_voxels": check_box_voxels, "residual": check_residual,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
           "vector_grid": check_vector_grid, "related_voxels": check_related_voxels,

@@ -85,10 +85,10 @@ std::string difference(const Field& a, const Field& b) {
 std::string difference(const StoredGrid& a, const StoredGrid& b) {
   if (!(a.descriptor == b.descriptor)) return "descriptor";
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
-  if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask || a.levels != b.levels)
-    return "topology";
+  if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask) return "topology";
   if (!sameBits(a.activeThreshold, b.activeThreshold)) return "threshold";
   if (a.withinRange != b.withinRange) return "withinRange";
+  if (a.boxVoxels != b.boxVoxels) return "box voxels";
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";
   if (!sameBits(a.valueMin, b.valueMin) || !sameBits(a.valueMax, b.valueMax)) return "value range";
   if (a.curve != b.curve) return "curve";
@@ -348,18 +348,11 @@ StoredGrid masked() {
   return grid;
 }
 
-/// An ellipsoid whose bricks, in two places, have thresholds for each block.
-StoredGrid levelled() {
+/// An ellipsoid with voxels that touch all faces of its active box.
+StoredGrid withBoxVoxels() {
   StoredGrid grid = oneEllipsoid();
-  grid.topology = TopologyKind::kBlocks;
-  grid.activeThreshold = 0.125f;
-  for (const std::int32_t x : {-8, 0, 64})
-    for (std::int32_t z = 0; z < 40; z += 8) {
-      grid.bricks.push_back({x, 16, z});
-      BlockLevels& levels = grid.levels.emplace_back();
-      for (std::size_t n = 0; n < kBlocksOfBrick; ++n)
-        levels.of[n] = std::uint8_t(n == 3 ? z : x == 64 ? 47 - n : 20);
-    }
+  grid.activeBox = {{-100, -24, 0}, {300, -9, 2000}};
+  grid.boxVoxels = {{-100, -20, 2000}, {7, -9, 5}, {300, -24, 0}};
   return grid;
 }
 
@@ -446,7 +439,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"mirrored_voxels", fileOf(mirroredValues())},
       {"copied_voxels", fileOf(copiedValues())},
       {"mask", fileOf(masked())},
-      {"levels", fileOf(levelled())},
+      {"box_voxels", fileOf(withBoxVoxels())},
       {"twins", twins()},
       {"residual", fileOf(corrected())},
       {"carried",

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <limits>
 #include <map>
 
 #include "../field/random_field.h"
@@ -126,6 +127,43 @@ TEST(VoxelSection, KnowsCommonValues) {
   ASSERT_EQ(layer.form, VoxelForm::kFloat);
   // Half of the voxels have 23 bits of noise; the others take almost no bits.
   EXPECT_LT(double(putVoxels(layer).size()) * 8.0, 0.5 * 25.0 * double(volume.values.size()));
+  EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
+}
+
+/// Differences of all sizes, and those that exceed 32 bits.
+TEST(VoxelSection, HoldsAnyFloats) {
+  test::Random random(13);
+  const auto value = [&](Coord) {
+    const double exponent = random(-149.0, 128.0);
+    return float(std::ldexp(random(0.0, 1.0) < 0.5 ? -1.0 : 1.0, int(exponent)));
+  };
+  const VoxelLayer layer = exactLayer(test::volumeOf({}, 4, 0.0f, value));
+  EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
+  VoxelLayer codes;
+  codes.form = VoxelForm::kQuantised;
+  codes.bricks = {{0, 0, 0}};
+  codes.active.resize(1);
+  codes.vacant.resize(1);
+  codes.active[0].setAll();
+  for (int v = 0; v < kBrickVoxels; ++v)
+    codes.codes.push_back(v % 3 == 0   ? std::numeric_limits<std::int32_t>::min()
+                          : v % 3 == 1 ? std::numeric_limits<std::int32_t>::max()
+                                       : v);
+  EXPECT_EQ(voxelsOf(putVoxels(codes), "v"), codes);
+}
+
+/// More than 2048 bricks are several blocks, each of which has several parts. Some voxels are neither active nor vacant.
+TEST(VoxelSection, HoldsBlocksAndParts) {
+  const SparseVolume volume = test::volumeOf({}, 14, -1.0f, [](Coord v) {
+    const float wave = float(std::sin(v.x * 0.3) * std::sin(v.y * 0.2) + std::cos(v.z * 0.1));
+    return wave > 0.0f ? wave : -1.0f;
+  });
+  VoxelLayer layer = boundedLayer(volume, 0.01, Activity::kExact);
+  for (std::size_t b = 0; b < layer.bricks.size(); b += 3)
+    for (int v = int(b % 7); v < kBrickVoxels; v += 5)
+      if (layer.active[b].test(v))
+        layer.active[b].words[std::size_t(v / 64)] ^= std::uint64_t{1} << (v % 64);
+  ASSERT_GT(layer.bricks.size(), 2048u);
   EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
 }
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "esvr/compact.h"
 #include "esvr/container.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "fuzz/input_file.h"

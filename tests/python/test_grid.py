@@ -13,7 +13,9 @@ import esvr
 
 def test_a_fit_is_near_its_source(volume, grid):
     assert grid.kind == "ellipsoids" and grid.ellipsoid_count == 40
-    assert esvr.compare(volume, grid).psnr_box > 35.0
+    quality = esvr.compare(volume, grid)
+    assert quality.psnr_box > 35.0
+    assert quality.psnr_t90 > quality.psnr_t50 > 30.0 and quality.psnr_t10 > 20.0 and quality.median_depth > 0.0
 
 
 def test_goals_are_reached(volume):
@@ -210,4 +212,5 @@ def test_real_files_are_fitted(data, tmp_path):
     volume = esvr.Volume.from_vdb(data / "cube_levelset.vdb")
     grid = esvr.fit(volume, lossless=True)
     assert volume.grid_class == "level set" and esvr.compare(volume, grid).max_error == 0.0
+    assert esvr.compare(volume, grid).psnr_t50 is None
     assert grid.render(64, 64, device="cpu").any()

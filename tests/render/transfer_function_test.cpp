@@ -12,6 +12,8 @@
 #include <limits>
 
 #include "esvr/error.h"
+#include "esvr/grid.h"
+#include "esvr/volume.h"
 
 namespace esvr::test {
 namespace {
@@ -151,6 +153,63 @@ TEST(TransferFunction, ALevelSetIsOpaqueInsideAndDarkInAThinLayerBeforeIt) {
   EXPECT_EQ(opacityAt(f.opacity, 3.0), 0.0) << "the background";
   EXPECT_LT(colorAt(f.colors, 1e-9).g, colorAt(f.colors, -1e-9).g);
   EXPECT_THROW((void)levelSetSurface(0.0), UsageError);
+}
+
+// The usual look.
+
+TEST(UsualLook, IsALineUnlessTheLargestValueIsFarAboveTheOthers) {
+  const LookBasis smoke{.range = {0.25f, 2.0f}};
+  const OpacityCurve line = rescaled({{}, builtInOpacity("linear")}, {0.0f, 2.0f}).opacity;
+  EXPECT_EQ(usualOpacity(smoke), line);
+  LookBasis deep = smoke;
+  deep.medianDepth = 20.0;
+  EXPECT_EQ(usualOpacity(deep), line);
+  deep.medianDepth = 2.0 * std::log(2.0);  // half of the light passes by the line, too
+  EXPECT_EQ(usualOpacity(deep), line);
+  const TransferFunction look = usualLook(smoke, "inferno");
+  EXPECT_EQ(look.colors, rescaled({builtInColorMap("inferno"), {}}, {0.0f, 2.0f}).colors);
+}
+
+/// Smoke with a spark: a column of 50 voxels of 0.02 lets half of the light through.
+TEST(UsualLook, ShowsFaintSmokeBesideASpark) {
+  constexpr double kFaint = 0.02, kVoxels = 50.0;
+  const LookBasis smoke{.range = {0.001f, 1000.0f}, .medianDepth = kFaint * kVoxels};
+  const TransferFunction look = usualLook(smoke);
+  ASSERT_NO_THROW(checkTransferFunction(look));
+  EXPECT_LE(look.opacity.size(), 12u) << "a curve that can be edited";
+  const auto light = [&](double value) {
+    return std::pow(1.0 - opacityAt(look.opacity, value), kVoxels);
+  };
+  EXPECT_NEAR(light(kFaint), 0.5, 0.01);
+  EXPECT_EQ(opacityAt(look.opacity, 0.0), 0.0);
+  EXPECT_EQ(opacityAt(look.opacity, 1000.0), 1.0);
+  for (double value = 1e-4; value < 1000.0; value *= 1.5)
+    EXPECT_GE(opacityAt(look.opacity, value), value / 1000.0) << value;
+}
+
+TEST(UsualLook, TakesAnyDepth) {
+  for (const double depth : {1e-320, 1e-45, 1e-6, 1.0, 1e44})
+    for (const float high : {1e-45f, 1e-20f, 1.0f, 3e38f}) {
+      const TransferFunction look = usualLook({.range = {0.0f, high}, .medianDepth = depth});
+      EXPECT_NO_THROW(checkTransferFunction(look)) << depth << ", " << high;
+    }
+}
+
+TEST(UsualLook, OfALevelSetIsItsSurface) {
+  EXPECT_EQ(usualLook({.range = {-3.0f, 3.0f}, .background = 3.0f, .isLevelSet = true}),
+            levelSetSurface(3.0));
+}
+
+TEST(UsualLook, LooksThroughFogVolumesOnly) {
+  GridDescriptor grid;
+  const SparseVolume volume =
+      makeVolume({{.corner = {8, 0, 0}, .values = {0.0f, 4.0f}, .active = {{3}}}}, 0.0f);
+  grid.gridClass = GridClass::kFogVolume;
+  const LookBasis fog = lookBasis(grid, volume);
+  EXPECT_EQ(fog.medianDepth, 4.0);
+  EXPECT_EQ(fog.range.max, 4.0f);
+  grid.gridClass = GridClass::kUnknown;
+  EXPECT_FALSE(lookBasis(grid, volume).medianDepth);
 }
 
 TEST(TransferFunction, WhatMakesNoSenseIsRefused) {

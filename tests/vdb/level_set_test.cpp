@@ -15,7 +15,7 @@
 #include <cmath>
 #include <limits>
 
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "esvr/grid_coding.h"
 #include "esvr/vdb_io.h"
 #include "esvr/volume.h"

@@ -205,9 +205,8 @@ class ExportESVR(JobOperator, bpy.types.Operator, ExportHelper):
     size: FloatProperty(name="Size (KB)", default=100.0, min=0.1)
     ratio: FloatProperty(name="Ratio", default=50.0, min=1.0)
     topology: EnumProperty(name="Active Voxels", default="auto", items=[
-        ("auto", "Automatic", "By their values where that is accurate, otherwise by a mask"),
-        ("exact", "Exact", "Exactly those of the source, by a mask"),
-        ("threshold", "By Value", "Those whose values differ enough from the background")])
+        ("auto", "By Value", "Those whose values differ from the background by more than the error"),
+        ("exact", "Exact", "Exactly those of the source, by a mask")])
     representation: EnumProperty(name="Stored as", default="auto", items=[
         ("auto", "Automatic", "Ellipsoids or voxels, whichever are better"),
         ("ellipsoids", "Ellipsoids", "Ellipsoids"),

@@ -7,7 +7,7 @@
 #include <span>
 #include <variant>
 
-#include "esvr/compact.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"

@@ -8,7 +8,7 @@
 #include <functional>
 #include <span>
 
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid.h"
@@ -308,6 +308,7 @@ constexpr const char* kFitText =
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
     "lossless: every active voxel bit for bit. The default is the quality of the preset ('draft',\n"
     "'standard' or 'high'), over the active voxels.\n\n"
+    "effort: how long the conversion may take, from 1 to 9.\n"
     "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. device:\n"
     "'auto', 'cpu', 'cuda' or 'cuda:N'. progress: is called with the share of the running fit "
     "that\n"
@@ -320,13 +321,17 @@ void addFit(py::module_& module) {
       "fit",
       [](const Volume& volume, std::optional<double> psnr, std::optional<double> maxError,
          std::optional<std::uint64_t> size, std::optional<std::size_t> count, bool lossless,
-         const std::string& preset, const std::string& representation, const std::string& storage,
-         const std::string& device, std::uint64_t seed, const Progress& progress) {
+         const std::string& preset, int effort, const std::string& representation,
+         const std::string& storage, const std::string& device, std::uint64_t seed,
+         const Progress& progress) {
         ConvertOptions options;
         options.goal = goalOf({psnr, maxError, size, count, lossless});
         options.representation = valueOf("representation", representation, kRepresentations);
         options.storage.form = valueOf("storage", storage, kStorages);
         options.fit.preset = valueOf("preset", preset, kPresets);
+        if (effort < kLeastEffort || effort > kMostEffort)
+          throw UsageError("effort must be from 1 to 9");
+        options.effort = effort;
         options.fit.count = count;
         options.fit.seed = seed;
         options.fit.device = selectDevice(device);
@@ -336,8 +341,9 @@ void addFit(py::module_& module) {
       py::arg("volume"), py::kw_only(), py::arg("psnr") = py::none(),
       py::arg("max_error") = py::none(), py::arg("size") = py::none(),
       py::arg("count") = py::none(), py::arg("lossless") = false, py::arg("preset") = "standard",
-      py::arg("representation") = "auto", py::arg("storage") = "compact",
-      py::arg("device") = "auto", py::arg("seed") = 1, py::arg("progress") = py::none(), kFitText);
+      py::arg("effort") = kUsualEffort, py::arg("representation") = "auto",
+      py::arg("storage") = "compact", py::arg("device") = "auto", py::arg("seed") = 1,
+      py::arg("progress") = py::none(), kFitText);
 }
 
 }  // namespace esvr::python

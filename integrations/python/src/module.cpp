@@ -94,9 +94,18 @@ Volume voxelsOf(const Side& side) {
 VolumeMetrics compare(const Side& reference, const Side& candidate,
                       const std::optional<PlainBox>& box, std::optional<double> peak, bool ssim) {
   const Volume a = voxelsOf(reference), b = voxelsOf(candidate);
-  CompareOptions options{.peak = peak, .ssim = ssim};
+  CompareOptions options{
+      .peak = peak,
+      .ssim = ssim,
+      .transmittance = isLookedThrough(a.grid->descriptor.gridClass, a.grid->volume)};
   if (box) options.box = boxOf(*box);
   return interruptible([&] { return compareVolumes(a.grid->volume, b.grid->volume, options); });
+}
+
+/// A figure of the transmittance; None for a reference that is not looked through.
+template <auto Member>
+std::optional<double> light(const VolumeMetrics& m) {
+  return m.transmittance ? std::optional((*m.transmittance).*Member) : std::nullopt;
 }
 
 void addCompare(py::module_& module) {
@@ -104,6 +113,13 @@ void addCompare(py::module_& module) {
   py::class_<M>(module, "Metrics", "Errors of a volume against a reference.")
       .def_readonly("psnr_box", &M::psnrBox, "dB over the box; infinite without an error.")
       .def_readonly("psnr_active", &M::psnrActive, "dB over the active voxels of the reference.")
+      .def_property_readonly("psnr_t90", &light<&TransmittancePsnr::psnr90>,
+                             "dB of the transmittance, where the median column lets 90 % of the\n"
+                             "light through; None where the reference is not looked through.")
+      .def_property_readonly("psnr_t50", &light<&TransmittancePsnr::psnr50>, "The same with 50 %.")
+      .def_property_readonly("psnr_t10", &light<&TransmittancePsnr::psnr10>, "The same with 10 %.")
+      .def_property_readonly("median_depth", &light<&TransmittancePsnr::medianDepth>,
+                             "Sum of the values of the reference's median column.")
       .def_readonly("mse_box", &M::mseBox)
       .def_readonly("mse_active", &M::mseActive)
       .def_readonly("max_error", &M::maxError, "Largest absolute error over the box.")

@@ -18,7 +18,9 @@ namespace {
 struct Look {
   Resolution resolution;
   CameraWish camera;
-  std::string colors, opacity, device;
+  std::string colors;
+  std::optional<std::string> opacity;  ///< nothing: the usual one
+  std::string device;
   std::optional<std::filesystem::path> transfer;
   std::optional<std::array<float, 2>> range;
   double step = 1.0, opacityLength = 1.0;
@@ -28,23 +30,23 @@ struct Look {
 /// What a picture needs to know of a grid or a volume.
 struct Subject {
   Box box;
-  ValueRange range;
-  float background = 0.0f;
-  bool isLevelSet = false;
+  LookBasis look;
 };
 
-/// The function of esvr-render: a level set is an opaque body unless something else is asked for.
+/// The function of esvr-render: the usual look unless something else is asked for.
 TransferFunction transferOf(const Look& look, const Subject& subject) {
   if (look.transfer) {
     const TransferFunction own = readParaViewPreset(*look.transfer);
     return look.range ? rescaled(own, {(*look.range)[0], (*look.range)[1]}) : own;
   }
-  if (!look.range && subject.isLevelSet && subject.background > 0.0f)
-    return levelSetSurface(double(subject.background));
-  ValueRange range = subject.range;
-  range.expand(subject.background);
+  const LookBasis& grid = subject.look;
+  const bool isSurface = grid.isLevelSet && grid.background > 0.0f;
+  if (!look.range && (isSurface || !look.opacity)) return usualLook(grid, look.colors);
+  ValueRange range = grid.range;
+  range.expand(grid.background);
   if (look.range) range = {(*look.range)[0], (*look.range)[1]};
-  return rescaled({builtInColorMap(look.colors), builtInOpacity(look.opacity)}, range);
+  return rescaled({builtInColorMap(look.colors), builtInOpacity(look.opacity.value_or("linear"))},
+                  range);
 }
 
 RenderOptions optionsOf(const Look& look, const Subject& subject) {
@@ -96,17 +98,14 @@ py::array_t<std::uint8_t> drawn(const Look& look, const Subject& subject, const 
 
 py::array_t<std::uint8_t> drawVolume(const Volume& self, const Look& look) {
   const SparseVolume& volume = self.grid->volume;
-  const bool isLevelSet = self.grid->descriptor.gridClass == GridClass::kLevelSet;
-  return drawn(look, {activeBox(volume), activeRange(volume), volume.background, isLevelSet},
+  return drawn(look, {activeBox(volume), lookBasis(self.grid->descriptor, volume)},
                [&](const Device& device) { return makeVolumeRenderer(volume, device); });
 }
 
 py::array_t<std::uint8_t> drawGrid(const Grid& self, const Look& look) {
   const StoredGrid& grid = *self.grid;
   if (!followsFromEllipsoids(grid)) return drawVolume(decoded(self, std::nullopt), look);
-  const bool isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet;
-  const Subject subject{
-      grid.activeBox, {grid.valueMin, grid.valueMax}, grid.field.background, isLevelSet};
+  const Subject subject{grid.activeBox, lookBasis(grid, kNoMemoryLimit)};
   return drawn(look, subject, [&](const Device& device) {
     return makeFieldRenderer(grid.field, device, {}, voxelRule(grid));
   });
@@ -115,7 +114,9 @@ py::array_t<std::uint8_t> drawGrid(const Grid& self, const Look& look) {
 constexpr const char* kRenderText =
     "Draws a picture: sRGB, uint8 of shape (height, width, 4).\n\n"
     "eye, center and up are in index coordinates; what is not given is chosen so that the picture\n"
-    "shows everything. colors and opacity are names of esvr-render, transfer a ParaView preset.\n"
+    "shows everything. colors and opacity are names of esvr-render, whose usual opacity is taken "
+    "if\n"
+    "none is given; transfer is a ParaView preset.\n"
     "range has the values at the ends of the transfer function. Without a background (r, g, b), "
     "the\n"
     "alpha channel is the opacity, and colors are not premultiplied.";
@@ -127,7 +128,8 @@ void addRenderTo(py::handle type, py::array_t<std::uint8_t> (*draw)(const Subjec
   auto method = py::cpp_function(
       [draw](const Subject& self, int width, int height, const Point& eye, const Point& center,
              const Point& up, std::optional<double> fov, const std::string& colors,
-             const std::string& opacity, const std::optional<std::filesystem::path>& transfer,
+             const std::optional<std::string>& opacity,
+             const std::optional<std::filesystem::path>& transfer,
              const std::optional<std::array<float, 2>>& range, double step, double opacityLength,
              const std::optional<std::array<double, 3>>& background, const std::string& device) {
         return draw(self, {{width, height},
@@ -144,7 +146,7 @@ void addRenderTo(py::handle type, py::array_t<std::uint8_t> (*draw)(const Subjec
       py::name("render"), py::is_method(type), py::arg("width") = 800, py::arg("height") = 800,
       py::kw_only(), py::arg("eye") = py::none(), py::arg("center") = py::none(),
       py::arg("up") = py::none(), py::arg("fov") = py::none(), py::arg("colors") = "viridis",
-      py::arg("opacity") = "linear", py::arg("transfer") = py::none(),
+      py::arg("opacity") = py::none(), py::arg("transfer") = py::none(),
       py::arg("range") = py::none(), py::arg("step") = 1.0, py::arg("opacity_length") = 1.0,
       py::arg("background") = py::none(), py::arg("device") = "auto", kRenderText);
   py::setattr(type, "render", method);

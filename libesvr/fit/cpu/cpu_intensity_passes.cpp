@@ -123,8 +123,9 @@ void CpuIntensityPasses::setShapes(const Field& field) {
   const auto reach = supports(field);
   const SupportOf supportOf = [&](std::size_t i) -> const Support& { return reach[i]; };
   BrickIndex index = known_;
-  if (!restricted_) index.append(missingBricks(known_, reach.size(), supportOf));
-  plan_ = {gather(field), pairsWithin(index, reach.size(), supportOf)};
+  plan_.field = gather(field);
+  plan_.pairs = restricted_ ? pairsWithin(index, reach.size(), supportOf)
+                            : pairsOfAll(index, reach.size(), supportOf);
   corners_.clear();
   for (const Coord brick : index.bricks()) corners_.push_back(brick * kBrickSide);
   projections_.resize(plan_.pairs.pairCount());

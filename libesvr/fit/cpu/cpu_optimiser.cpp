@@ -47,6 +47,7 @@ void CpuOptimiser::setEllipsoids(std::span<const Ellipsoid> ellipsoids) {
   states_.assign(ellipsoids_.size(), {});
   gradients_.assign(ellipsoids_.size(), {});
   stale_ = true;
+  loss_.reset();
 }
 
 void CpuOptimiser::setState(const FitState& state) {
@@ -95,7 +96,8 @@ double CpuOptimiser::iterate(std::span<const double> factors) {
   double loss = 0.0;
   for (const double factor : factors) {
     if (stale_) rebuildLists();
-    loss = pass_.gradients(ellipsoids_, gradients_);
+    loss = loss_ ? *loss_ : pass_.gradients(ellipsoids_, gradients_);
+    loss_.reset();
     if (!std::isfinite(loss)) throw RuntimeFailure("the fit diverged: its loss is not finite");
     step(factor);
   }
@@ -113,6 +115,7 @@ std::vector<Ellipsoid> CpuOptimiser::newSeeds(std::size_t count) {
   if (stale_) buildTightLists();
   pass_.residuals(ellipsoids_, residuals_);
   stale_ = true;  // the caller adds or moves ellipsoids
+  loss_.reset();
   SeedOptions options;
   options.draw = {count, target_.seedBricks, signsOf(target_),
                   options_.seed ^ (++samplings_ << 32)};
@@ -161,6 +164,12 @@ FitErrors CpuOptimiser::measure() {
   return errorsOf(target_, {pass_.index(), residuals_});
 }
 
+FitErrors CpuOptimiser::measureBeforeIteration() {
+  rebuildLists();
+  loss_ = pass_.gradients(ellipsoids_, gradients_, &residuals_);
+  return errorsOf(target_, {pass_.index(), residuals_});
+}
+
 double CpuOptimiser::kappaSlope() {
   double slope = 0.0;
   const double logMByKappa = kernelWidth(kernel_).logMByKappa;
@@ -177,6 +186,7 @@ void CpuOptimiser::setKappa(float kappa) {
   const double factor = std::sqrt(kernelWidth(kernel_).m / before);
   for (Ellipsoid& p : ellipsoids_) shrinkBy(p, factor);
   stale_ = stale_ || anyOutgrown();
+  loss_.reset();
 }
 
 void CpuOptimiser::dropUnseen() {
@@ -191,6 +201,7 @@ void CpuOptimiser::dropUnseen() {
   states_.resize(kept);
   gradients_.resize(kept);
   stale_ = true;
+  loss_.reset();
 }
 
 }  // namespace esvr

@@ -2,6 +2,7 @@
 /// The optimiser on the CPU.
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -23,6 +24,7 @@ class CpuOptimiser final : public Optimiser {
   double iterate(std::span<const double> factors) override;
   [[nodiscard]] std::uint32_t batchSize() const override { return 1; }
   [[nodiscard]] FitErrors measure() override;
+  [[nodiscard]] FitErrors measureBeforeIteration() override;
   void dropUnseen() override;
   [[nodiscard]] const Kernel& kernel() const override { return options_.kernel; }
   [[nodiscard]] double kappaSlope() override;
@@ -58,6 +60,7 @@ class CpuOptimiser final : public Optimiser {
   std::vector<ListedSupport> listed_;  ///< the supports that the lists of the iterations hold
   std::uint32_t refused_ = 0;          ///< steps that were refused since those lists were built
   bool stale_ = true;                  ///< true if those lists are outdated
+  std::optional<double> loss_;  ///< sum of r^2, if gradients_ are those of the current ellipsoids
 };
 
 }  // namespace esvr

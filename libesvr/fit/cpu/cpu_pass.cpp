@@ -1,5 +1,7 @@
 #include "fit/cpu/cpu_pass.h"
 
+#include <bit>
+#include <limits>
 #include <utility>
 
 #include "core/parallel.h"
@@ -26,22 +28,10 @@ void visitBricks(const BrickIndex& index, const Visit& visit) {
   visitAll(index.size(), 4, visit);
 }
 
-double sumOfSquares(const float* r) {
-  // Eight partial float32 sums of 64 terms each are precise enough and allow SIMD.
-  float part[8] = {};
-  for (int v = 0; v < kBrickVoxels; v += 8)
-    for (int l = 0; l < 8; ++l) part[l] += r[v + l] * r[v + l];
-  double sum = 0.0;
-  for (const float p : part) sum += double(p);
-  return sum;
-}
-
-/// Reads values of a brick. \param all  those of the target's bricks; the others have zeros
-void readBrick(std::span<const float> all, std::size_t brick, float* out) {
-  if ((brick + 1) * kBrickVoxels <= all.size())
-    std::copy_n(all.data() + brick * kBrickVoxels, kBrickVoxels, out);
-  else
-    std::fill_n(out, kBrickVoxels, 0.0f);
+/// The values of a brick. \param all  those of the target's bricks; the others have zeros
+const float* targetBrick(std::span<const float> all, std::size_t brick) {
+  alignas(64) static constexpr float kZeros[kBrickVoxels] = {};
+  return (brick + 1) * kBrickVoxels <= all.size() ? all.data() + brick * kBrickVoxels : kZeros;
 }
 
 }  // namespace
@@ -68,12 +58,15 @@ void CpuPass::rebuild(std::span<const ListedSupport> listed) {
 void CpuPass::listSupports() {
   const auto supportOf = [&](std::size_t i) -> const Support& { return supports_[i]; };
   index_ = BrickIndex(target_.bricks);
-  if (!target_.narrowBand) {
-    const Box within = target_.within.value_or(bricksOf(Box::whole()));
-    index_.append(missingBricks(index_, supports_.size(), supportOf, within));
-  }
-  pairs_ = pairsWithin(index_, supports_.size(), supportOf);
+  pairs_ = target_.narrowBand ? pairsWithin(index_, supports_.size(), supportOf)
+                              : pairsOfAll(index_, supports_.size(), supportOf,
+                                           target_.within.value_or(bricksOf(Box::whole())));
   moments_.resize(pairs_.pairCount());
+  placeOf_.resize(pairs_.pairCount());
+  visitEllipsoids(supports_.size(), [&](std::size_t i) {
+    for (auto k = pairs_.ellipsoidBegin[i]; k != pairs_.ellipsoidBegin[i + 1]; ++k)
+      placeOf_[pairs_.pairOf[k]] = k;
+  });
 }
 
 /// Computes the forms of the current ellipsoids.
@@ -84,25 +77,25 @@ void CpuPass::prepare(std::span<const Ellipsoid> ellipsoids) {
     const Ellipsoid& p = ellipsoids[i];
     frames_[i] = frameOf(p.center);
     const auto center = inFrame(p.center, frames_[i]);
-    forms_[i] = makeLineForm(center, p.L, kernels_.radius(i), p.intensity);
+    forms_[i] = makeBrickForm(center, p.L, kernels_.radius(i), p.intensity);
   });
 }
 
-/// Reads the target's values of a brick, and starts a sum: r = constants - t.
-void CpuPass::startFrom(std::size_t brick, float* t, float* r) const {
-  readBrick(target_.values, brick, t);
-  for (int v = 0; v < kBrickVoxels; ++v) r[v] = -t[v];
+/// Starts the sum of a brick: r = constants - target.
+void CpuPass::start(std::size_t brick, float* r) const {
+  brickKernels().start(targetBrick(target_.values, brick), r);
   if (target_.constants.empty()) return;
-  alignas(64) float constants[kBrickVoxels];
-  readBrick(target_.constants, brick, constants);
+  const float* const constants = targetBrick(target_.constants, brick);
   for (int v = 0; v < kBrickVoxels; ++v) r[v] += constants[v];
 }
 
-/// Replaces r = V - t by clamp(V, lowest, highest) - t, if the target saturates.
-void CpuPass::saturate(const float* t, float* r) const {
-  if (!target_.saturates) return;
-  const auto low = float(target_.lowest), high = float(target_.highest);
-  for (int v = 0; v < kBrickVoxels; ++v) r[v] = std::clamp(r[v], low - t[v], high - t[v]);
+/// Clamps the sum of a brick if the target saturates. \return sum of r^2
+double CpuPass::finish(std::size_t brick, float* r) const {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const bool clamps = target_.saturates;
+  return brickKernels().finish(targetBrick(target_.values, brick),
+                               clamps ? float(target_.lowest) : -kInfinity,
+                               clamps ? float(target_.highest) : kInfinity, r);
 }
 
 /// Adds the ellipsoids of a brick to the sum and records phi on the tapes.
@@ -128,20 +121,26 @@ void CpuPass::backward(std::size_t brick, const PairTapes& scratch, const float*
   const Coord corner = index_.bricks()[brick] * kBrickSide;
   const BrickKernels& kernels = brickKernels();
   for (auto pair = begin; pair != end; ++pair) {
+    const PairTape& tape = scratch.tapes[pair - begin];
+    PairMoments& moments = moments_[placeOf_[pair]];
+    if (tape.rows == 0) {  // a third of the pairs, because lists have a slack
+      moments = {};
+      continue;
+    }
     const auto i = pairs_.ellipsoid[pair];
     const auto at = cornerIn(frames_[i], corner);
-    kernels.backward(forms_[i], at.data(), kernels_.constants(i), byValue,
-                     scratch.tapes[pair - begin], moments_[pair]);
+    kernels.backward(forms_[i], at.data(), kernels_.constants(i), byValue, tape, moments);
   }
 }
 
 /// Computes the gradients from the moments of all pairs.
 void CpuPass::reduce(std::span<EllipsoidGradient> out) const {
   visitEllipsoids(forms_.size(), [&](std::size_t i) {
-    PairSums sums{};
-    for (auto k = pairs_.ellipsoidBegin[i]; k != pairs_.ellipsoidBegin[i + 1]; ++k)
-      sums.add(moments_[pairs_.pairOf[k]]);
-    out[i] = ellipsoidGradient(forms_[i], sums, double(kernels_.constants(i).slope));
+    const auto begin = pairs_.ellipsoidBegin[i], end = pairs_.ellipsoidBegin[i + 1];
+    MomentTotals sums;
+    brickKernels().sumMoments(moments_.data() + begin, end - begin, sums);
+    out[i] = ellipsoidGradient(forms_[i], std::bit_cast<PairSums>(sums),
+                               double(kernels_.constants(i).slope));
   });
 }
 
@@ -149,28 +148,30 @@ void CpuPass::residuals(std::span<const Ellipsoid> ellipsoids, std::vector<float
   prepare(ellipsoids);
   out.resize(index_.size() * kBrickVoxels);
   visitBricks(index_, [&](std::size_t b) {
-    alignas(64) float r[kBrickVoxels], t[kBrickVoxels];
-    startFrom(b, t, r);
+    alignas(64) float r[kBrickVoxels];
+    start(b, r);
     const Coord corner = index_.bricks()[b] * kBrickSide;
     for (auto pair = pairs_.brickBegin[b]; pair != pairs_.brickBegin[b + 1]; ++pair) {
       const auto i = pairs_.ellipsoid[pair];
       brickKernels().add(forms_[i], cornerIn(frames_[i], corner).data(), kernels_.constants(i), r);
     }
-    saturate(t, r);
+    finish(b, r);
     std::copy_n(r, kBrickVoxels, out.data() + b * kBrickVoxels);
   });
 }
 
-double CpuPass::gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out) {
+double CpuPass::gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out,
+                          std::vector<float>* residuals) {
   prepare(ellipsoids);
   brickLoss_.resize(index_.size());
+  if (residuals) residuals->resize(index_.size() * kBrickVoxels);
   visitBricks(index_, [&](std::size_t b) {
     PairTapes& scratch = tapes_.local();
-    alignas(64) float r[kBrickVoxels], t[kBrickVoxels];
-    startFrom(b, t, r);
+    alignas(64) float r[kBrickVoxels];
+    start(b, r);
     forward(b, scratch, r);
-    saturate(t, r);
-    brickLoss_[b] = sumOfSquares(r);
+    brickLoss_[b] = finish(b, r);
+    if (residuals) std::copy_n(r, kBrickVoxels, residuals->data() + b * kBrickVoxels);
     backward(b, scratch, r);
   });
   reduce(out);

@@ -101,8 +101,10 @@ class CpuPass {
   /// FitTarget::saturates, V is clamped, and the loss goes on linearly beyond the range: its
   /// derivative by the sum is r there too, so that a sum far beyond the range is pulled back unless
   /// the target is the range's end.
+  /// \param residuals  also gets what residuals() writes, if it is not null
   /// \return sum of r^2
-  double gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out);
+  double gradients(std::span<const Ellipsoid> ellipsoids, std::span<EllipsoidGradient> out,
+                   std::vector<float>* residuals = nullptr);
 
   /// Computes the gradients of another loss from its derivative by V.
   /// \param lossByValue  kBrickVoxels values for each brick, in the order of residuals()
@@ -115,8 +117,8 @@ class CpuPass {
  private:
   void listSupports();
   void prepare(std::span<const Ellipsoid> ellipsoids);
-  void startFrom(std::size_t brick, float* t, float* r) const;
-  void saturate(const float* t, float* r) const;
+  void start(std::size_t brick, float* r) const;
+  double finish(std::size_t brick, float* r) const;
   void forward(std::size_t brick, PairTapes& scratch, float* sum) const;
   void backward(std::size_t brick, const PairTapes& scratch, const float* byValue);
   void reduce(std::span<EllipsoidGradient> out) const;
@@ -126,9 +128,10 @@ class CpuPass {
   BrickIndex index_;
   BrickPairs pairs_;
   std::vector<Support> supports_;  ///< supports in the current lists
-  std::vector<LineForm> forms_;
+  std::vector<BrickForm> forms_;
   std::vector<Coord> frames_;  ///< origin of each form's center, near it for float32 precision
-  std::vector<PairMoments> moments_;
+  std::vector<std::uint32_t> placeOf_;  ///< by pair: the place of its moments
+  std::vector<PairMoments> moments_;    ///< of all pairs, in the order of the ellipsoids
   std::vector<double> brickLoss_;
   tbb::enumerable_thread_specific<PairTapes> tapes_;
 };

@@ -21,16 +21,13 @@ inline constexpr std::uint16_t kFormatVersion = 1;
 inline constexpr std::uint64_t kSectionRowBytes = 56;  ///< a row of a file's section table
 
 /// The rule that determines the active voxels when a grid is revoxelised. No voxel outside
-/// StoredGrid::activeBox is active.
+/// StoredGrid::activeBox is active, and StoredGrid::boxVoxels are.
 enum class TopologyKind {
   kThreshold = 0,  ///< a voxel is active if |V - background| > activeThreshold
   /// The rule of kThreshold, within the stored bricks only. If the grid is a narrow band, a voxel
   /// of these bricks is active if |V| < background - activeThreshold.
   kBricks = 1,
-  kMask = 2,  ///< the voxels of `mask` are active, whatever their values
-  /// The rule of kThreshold within the stored bricks only, and with a threshold for each block of
-  /// 4^3 voxels: thresholdAt(activeThreshold, level).
-  kBlocks = 3,
+  kMask = 2  ///< the voxels of `mask` are active, whatever their values
 };
 
 /// The error of the first k importance layers of every chunk against the source. A grid has a row
@@ -56,19 +53,20 @@ struct StoredGrid {
   GridDescriptor descriptor;
   Field field;
   TopologyKind topology = TopologyKind::kThreshold;
-  /// Threshold of the topology; negative: all voxels are active. For kBlocks that of level 0, above 0.
-  float activeThreshold = 0.0f;
+  float activeThreshold = 0.0f;  ///< threshold of the topology; negative: all voxels are active
   /// Index corners of the bricks that may have active voxels, increasing; empty for kThreshold.
   std::vector<Coord> bricks;
-  std::vector<BrickMask> mask;      ///< active voxels of each brick, for kMask; else empty
-  std::vector<BlockLevels> levels;  ///< levels of each brick, for kBlocks; else empty
+  std::vector<BrickMask> mask;  ///< active voxels of each brick, for kMask; else empty
   /// The background of the source is far from its values (spanOf, volume.h). The background of
   /// `field` and of `voxels` then is a value among the active ones, to which these are relative, and
   /// decoded inactive voxels get the background of `descriptor`. Only with kMask or with voxels.
   bool farBackground = false;
-  bool withinRange = true;         ///< decoded values are clamped to the source's range of values
-  Box activeBox;                   ///< active bounding box of the source, index coordinates
-  std::uint64_t activeVoxels = 0;  ///< number of active voxels of the source
+  bool withinRange = true;  ///< decoded values are clamped to the source's range of values
+  Box activeBox;            ///< active bounding box of the source, index coordinates
+  /// Voxels of `activeBox` that are active whatever their values, so that its faces keep an active voxel;
+  /// at most kMostBoxVoxels, increasing; empty for kMask and for voxels.
+  std::vector<Coord> boxVoxels;
+  std::uint64_t activeVoxels = 0;          ///< number of active voxels of the source
   float valueMin = 0.0f, valueMax = 0.0f;  ///< range of the source's active voxels
   std::vector<CurvePoint> curve;
   /// The quantised ellipsoids of every chunk. The ellipsoids of `field` are exactly their

@@ -64,11 +64,11 @@ struct RevoxeliseOptions {
   /// If this is not empty, the voxels of these masks, one for each of `bricks`, are active whatever
   /// their values, and no others. It needs `restrictToBricks`.
   std::span<const BrickMask> masks{};
-  /// If this is not empty, `threshold` is that of level 0, and the blocks of `bricks` have these
-  /// levels (ellipsoids.h). It needs `restrictToBricks`, and no masks.
-  std::span<const BlockLevels> levels{};
   Box box = Box::whole();  ///< no voxel outside this box is active
-  VoxelMemory memory{};    ///< holds the voxels
+  /// Voxels (index coordinates) of `box` that are active whatever their values. With `restrictToBricks`,
+  /// they lie in `bricks`, and there are no masks.
+  std::span<const Coord> alwaysActive{};
+  VoxelMemory memory{};  ///< holds the voxels
 };
 
 /// Converts a field to voxels. Inactive voxels hold the background (with a sign if `narrowBand` is

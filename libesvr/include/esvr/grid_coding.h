@@ -19,42 +19,20 @@
 
 namespace esvr {
 
-/// How a stored grid finds its active voxels.
-struct ActivityOptions {
-  Activity activity = Activity::kAuto;
-  /// The simplified masks of the source, if they are kept; null: one is made if needed.
-  const SimplifiedMasks* simplified = nullptr;
-};
-
 /// Makes a stored grid from a fitted field and the properties of its source. It chooses the rule by
 /// which a reader determines the active voxels:
 ///  - a threshold. Among the thresholds that increase the squared error by at most 0.004 dB, it is
-///    the one whose active voxels have the largest intersection over union with the source's;
-///  - a threshold for each block (ellipsoids.h), unless `activity` is kByValue, if the overlap of the
-///    single one does not suffice (MaskOverlap, quantised.h), those of the blocks do, and the
-///    source's values are not in a file;
-///  - the source's simplified mask, if `activity` is kAuto, no thresholds suffice, and the source's
-///    values are not in a file;
+///    the one whose active voxels have the largest intersection over union with the source's. A few
+///    voxels of the source (boxVoxels, volume.h) are active in any case, so that the active box is the
+///    source's, whatever becomes of the ellipsoids later;
 ///  - the source's active mask, if `activity` is kExact, or if no threshold restores a voxel
 ///    because all values equal the background;
-///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks, unless
-///    `activity` is kExact.
+///  - for a narrow band, the rule of kBricks (container.h) with the source's bricks and the same few
+///    voxels, unless `activity` is kExact.
 /// The curve is left empty.
 [[nodiscard]] StoredGrid makeStoredGrid(const GridDescriptor& descriptor,
                                         const SparseVolume& source, Field field,
-                                        const ActivityOptions& options = {});
-
-/// Chooses the rule by which a reader determines the active voxels again, after the ellipsoids of a
-/// grid have changed. Masks, and a single threshold that still suffices, are kept.
-void renewActivity(const SparseVolume& source, const ActivityOptions& options, StoredGrid& grid);
-
-/// A grid whose blocks have thresholds of their own with the middle one for all of them; other grids
-/// are returned unchanged.
-[[nodiscard]] StoredGrid withOneThreshold(StoredGrid grid);
-
-/// Gives a grid of ellipsoids a mask of active voxels instead of its own rule.
-/// \param masks  those of the bricks of `source`
-void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, StoredGrid& grid);
+                                        Activity activity = Activity::kByValue);
 
 /// True for a closed level set: its background (the half width of its band) is above 0 and not
 /// exceeded by an active voxel, an active voxel is negative, and the signs around its empty space
@@ -73,8 +51,7 @@ void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, Sto
                                           const SparseVolume& source, VoxelLayer layer);
 
 /// The rule by which decodeGrid() makes voxels from the sum: the grid's threshold, range, band,
-/// bricks, mask and active box, without its residual. It refers to the bricks and the mask of
-/// `grid`.
+/// bricks, mask, active box and box voxels, without its residual. It refers to the lists of `grid`.
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 
 /// True if the voxels of a grid follow from its ellipsoids by voxelRule() alone. This is not so if
@@ -82,7 +59,8 @@ void storeMask(const SparseVolume& source, std::span<const BrickMask> masks, Sto
 [[nodiscard]] bool followsFromEllipsoids(const StoredGrid& grid);
 
 struct DecodeOptions {
-  /// Replaces the grid's own threshold, or its mask within the mask's bricks; 0 or above.
+  /// Replaces the grid's own threshold with its box voxels, or its mask within the mask's bricks; 0 or
+  /// above.
   std::optional<float> threshold{};
   /// Voxels outside the box come back inactive, and bricks outside are not evaluated.
   std::optional<Box> box{};

@@ -5,10 +5,56 @@
 #include <cstdint>
 #include <optional>
 
+#include "esvr/ellipsoids.h"
 #include "esvr/grid.h"
 #include "esvr/volume.h"
 
 namespace esvr {
+
+// The transmittance of a volume that is looked through, such as smoke. A picture of it shows how much
+// light passes, and not its values: half of the values may be a hundredth of the largest one, and
+// they are most of what is seen.
+//
+// The values along each axis of index space are added up within a box, where values below 0 and
+// values outside the box count as 0. This gives three pictures of optical depth, with a pixel for
+// each column of voxels. A column of depth d lets exp(-k d) of the light through. k is such that the
+// median column of the reference lets T of it through; the median is the upper one of the columns of
+// all three pictures that are deeper than a thousandth of the largest value. The squared errors of the
+// transmittance are averaged over all columns of the box, empty ones too, and the peak is 1. Three T
+// stand for three densities in a renderer.
+
+/// Whether a grid is shown by looking through it: it is a fog volume, or it has no class and no
+/// active value below 0, and space outside its bricks is empty, which means a background of at most 0.
+[[nodiscard]] bool isLookedThrough(GridClass gridClass, const SparseVolume& volume);
+
+/// PSNR of transmittance, in dB; +inf if the errors are zero.
+struct TransmittancePsnr {
+  double medianDepth = 0.0;  ///< sum of the values of the reference's median column
+  double psnr90 = 0.0, psnr50 = 0.0, psnr10 = 0.0;  ///< for T = 0.9, 0.5 and 0.1
+};
+
+/// The PSNR of the candidate's transmittance. Voxels of the candidate outside the box do not count.
+/// The result is bit-identical for any number of threads and for volumes that are shifted by whole
+/// bricks.
+/// \param box  default: the reference's active bounding box
+/// \return nothing if no column of the reference has a positive depth, or if its background is
+///         above 0, so that no light passes
+/// \throws BadInput  a value is not finite (the text names the voxel)
+[[nodiscard]] std::optional<TransmittancePsnr> transmittancePsnr(
+    const SparseVolume& reference, const SparseVolume& candidate,
+    const std::optional<Box>& box = {});
+
+/// TransmittancePsnr::medianDepth of a volume.
+/// \return, \throws  as for transmittancePsnr
+[[nodiscard]] std::optional<double> medianDepth(const SparseVolume& volume);
+
+/// Estimates medianDepth() of the voxels of a field, for which some of its columns are evaluated, at
+/// most as many for each axis as lie in 2048 bricks. Voxels count whether they would be active or not.
+/// \param box    the active bounding box
+/// \param range  of the active values; the sum is clamped to it and to the background
+/// \return  as for transmittancePsnr
+[[nodiscard]] std::optional<double> medianDepth(const Field& field, const Box& box,
+                                                const ValueRange& range);
 
 // Errors of a volume against a reference. Sums are formed in float64 over the bricks of either
 // volume. Empty space within the box counts as voxels but takes no computing time. Where only one
@@ -19,6 +65,7 @@ struct CompareOptions {
   std::optional<Box> box{};      ///< box of the PSNR; default: the reference's active bounding box
   std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(reference)
   bool ssim = false;             ///< whether 3D SSIM is computed, which takes most of the time
+  bool transmittance = false;    ///< whether the PSNR of the transmittance is computed
 };
 
 struct VolumeMetrics {
@@ -33,6 +80,7 @@ struct VolumeMetrics {
   double iou = 1.0;        ///< intersection over union of the active voxels
   double massReference = 0.0, massCandidate = 0.0;  ///< sum of (value - background) over the box
   std::optional<double> ssim;
+  std::optional<TransmittancePsnr> transmittance;  ///< of a reference that lets light through
 };
 
 /// Compares two volumes. Voxels outside the box affect `iou`, `psnrActive` and `p999Error` only.

@@ -4,13 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
-#include <map>
-#include <mutex>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "esvr/ellipsoids.h"
@@ -115,65 +111,6 @@ void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids
 /// The ellipsoids that the integers represent, bit-identical on every machine.
 [[nodiscard]] Ellipsoids dequantise(const QuantisedEllipsoids& q);
 
-// A mask of active voxels that takes fewer bytes than that of a volume and is nearly the same.
-
-/// The overlap (intersection over union) of the active voxels of a source and of its stored grid is
-/// above this, unless the grid was told to find active voxels by their values (Activity).
-inline constexpr double kMinOverlap = 0.95;
-
-/// Voxels that are active in both masks, and in one of them at least.
-struct MaskOverlap {
-  std::uint64_t both = 0, either = 0;
-
-  /// Intersection over union; 1 if no voxel is active.
-  [[nodiscard]] double iou() const { return either > 0 ? double(both) / double(either) : 1.0; }
-  [[nodiscard]] bool suffices() const { return iou() > kMinOverlap; }
-};
-/// \param a, b  masks of the same bricks
-[[nodiscard]] MaskOverlap overlapOf(std::span<const BrickMask> a, std::span<const BrickMask> b);
-
-/// Simplifies the active mask of a volume until hardly more of the overlap may be given up. A voxel
-/// changes if the bits that this saves, by the contexts of the voxel coder, are worth more than the
-/// voxel; blocks of up to 8^3 voxels are changed together as well. The more a voxel differs from
-/// the background, the more it is worth. The active box stays the same, and no voxel outside the
-/// volume's bricks becomes active. The result is the same for any number of threads.
-/// \param expected  masks of the volume's bricks from which a decoder will predict them, such as those
-///                  of the previous frame of a sequence, or nothing
-/// \param error  error of the stored values at active voxels (root mean square), above 0. A voxel
-///               that differs from the background by this much is worth twice as much as one that
-///               does not differ, and one that differs by more than four times as much keeps its
-///               state
-/// \return masks of the volume's bricks, whose overlap with the volume's suffices()
-[[nodiscard]] std::vector<BrickMask> simplifiedMask(const SparseVolume& volume, double error,
-                                                    std::span<const BrickMask> expected = {});
-
-/// The simplified masks of a volume, which are made when they are first needed. Any number of
-/// threads can ask at the same time.
-class SimplifiedMasks {
- public:
-  using MakeExpected = std::function<std::vector<BrickMask>()>;
-
-  /// \param volume    must outlive the object
-  /// \param expected  makes the expected masks of simplifiedMask() when they are first needed
-  /// \param error     the error that the stored grid will have, if it is known before; there is only
-  ///                  one mask then
-  explicit SimplifiedMasks(const SparseVolume& volume, MakeExpected expected = {},
-                           std::optional<double> error = {})
-      : volume_(volume), makeExpected_(std::move(expected)), error_(error) {}
-
-  /// The mask for the known error, or else for this one, which is rounded to a power of two. It is kept
-  /// as long as the object.
-  [[nodiscard]] std::span<const BrickMask> forError(double error) const;
-
- private:
-  const SparseVolume& volume_;
-  MakeExpected makeExpected_;
-  std::optional<double> error_;
-  mutable std::mutex making_;
-  mutable std::optional<std::vector<BrickMask>> expected_;
-  mutable std::map<int, std::vector<BrickMask>> byExponent_;
-};
-
 // A grid's voxels as integer codes, exact or within a bound. A file holds such a layer if voxels
 // were chosen instead of ellipsoids (convert.h), or as a residual.
 
@@ -206,15 +143,13 @@ struct VoxelLayer {
 /// floats can hold all values, else kFloat.
 [[nodiscard]] VoxelLayer exactLayer(const SparseVolume& volume);
 
-/// How a stored grid says which voxels are active. No voxel outside the active bounding box of the
-/// source ever becomes active.
+/// How a stored grid says which voxels are active. Either way, the active bounding box stays that of the
+/// source: no voxel outside it becomes active, and each of its faces keeps an active voxel.
 enum class Activity {
-  /// By value if the overlap with the mask of the source then suffices (MaskOverlap,
-  /// quantised.h). Otherwise a simplified mask is stored, with which it does.
-  kAuto,
-  kNoMask,  ///< as kAuto, but no mask is stored
-  kExact,   ///< the exact active mask is stored
-  kByValue  ///< a voxel is active if its value differs from the background by more than the bound
+  /// A voxel is active if its value differs from the background by more than the error of the grid. No
+  /// mask is stored.
+  kByValue,
+  kExact  ///< the exact active mask is stored
 };
 
 /// Whether rounding keeps the signs of values. The surface of a level set is where they change.
@@ -236,15 +171,14 @@ enum class DecodedValues {
 void roundToHalfs(SparseVolume& volume);
 
 /// Makes a layer whose voxels are within `bound` of the volume's. If float32 is too coarse for the
-/// bound, the layer is exactLayer(). With a simplified mask, voxels of the source that differ from
-/// the background by more than the bound are active too.
-/// \param simplified  the volume's simplified masks for kAuto, if they are kept; null: one is made
-/// \param decoded     with kHalfs, the rounded voxels are within the bound, too. The volume's own
-///                    active voxels must be halfs.
+/// bound, the layer is exactLayer(). With Activity::kByValue, the voxels that differ from the background
+/// by no more than the bound become inactive and get the background, but for the few that keep the
+/// active box (boxVoxels, volume.h).
+/// \param decoded  with kHalfs, the rounded voxels are within the bound, too. The volume's own active
+///                 voxels must be halfs.
 /// \throws UsageError  the bound is not positive and finite
 [[nodiscard]] VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
                                       RoundedSigns signs = RoundedSigns::kMayChange,
-                                      const SimplifiedMasks* simplified = nullptr,
                                       DecodedValues decoded = DecodedValues::kFloats);
 
 /// What thriftyLayer() weighs. All errors are in squared steps of the quantisation lattice.

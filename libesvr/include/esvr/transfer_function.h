@@ -3,13 +3,18 @@
 /// values and are interpolated between the points as in ParaView and VTK, so that a preset gives
 /// the same colors as in these programs.
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "esvr/volume.h"
 
 namespace esvr {
+
+struct GridDescriptor;
+struct StoredGrid;
 
 /// An sRGB color; each channel is between 0 and 1.
 struct Rgb {
@@ -97,6 +102,35 @@ void checkTransferFunction(const TransferFunction& function);
 /// \param band  distance from the surface to the end of the narrow band, usually the background
 /// \throws UsageError  the band is not positive
 [[nodiscard]] TransferFunction levelSetSurface(double band);
+
+/// What the look of a grid follows from where no other look is asked for.
+struct LookBasis {
+  ValueRange range{};       ///< of the active values
+  float background = 0.0f;  ///< the range of the look includes it
+  bool isLevelSet = false;
+  /// Of a fog volume: the depth of its median column, medianDepth() (metrics.h).
+  std::optional<double> medianDepth{};
+};
+
+/// The basis of a volume's look. \throws BadInput  a value is not finite
+[[nodiscard]] LookBasis lookBasis(const GridDescriptor& grid, const SparseVolume& volume);
+
+/// The basis of a stored grid's look. The median column of a sum of ellipsoids is estimated, which
+/// takes no longer for a large grid. Stored voxels are decoded for it.
+/// \throws MemoryExceeded  they take more than maxBytes
+[[nodiscard]] LookBasis lookBasis(const StoredGrid& grid, std::uint64_t maxBytes);
+
+/// The usual opacity. It rises linearly over the range and is 1 at the largest value. If the largest
+/// values of a fog volume are so far above the others that the median column would let more than
+/// half of the light through, small values get a higher opacity: that of an extinction in
+/// proportion to the value, with which the median column lets half of the light through in rays of
+/// one voxel a unit of RenderOptions::opacityLength. No value has a lower opacity than by the line.
+[[nodiscard]] OpacityCurve usualOpacity(const LookBasis& grid);
+
+/// The usual look: levelSetSurface() for a level set with a positive background, otherwise a color
+/// map and usualOpacity(). esvr-render, esvr-view, the exported page and Python begin with it.
+[[nodiscard]] TransferFunction usualLook(const LookBasis& grid,
+                                         const std::string& colors = "viridis");
 
 /// Reads a ParaView preset in one of two formats:
 ///  - JSON: an object, or an array of objects, with "RGBPoints" [x r g b ...] and optionally

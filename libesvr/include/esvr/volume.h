@@ -226,6 +226,31 @@ struct SparseVolume {
 /// Bounding box of the active voxels, in index coordinates; empty if there are none.
 [[nodiscard]] Box activeBox(const SparseVolume& volume);
 
+/// The faces of a box that a voxel of the box touches, as bits: 1 and 2 are the faces of the lowest and of
+/// the highest x, 4 and 8 those of y, 16 and 32 those of z.
+[[nodiscard]] constexpr unsigned facesOf(const Box& box, Coord voxel) {
+  return (voxel.x == box.min.x ? 1u : 0u) | (voxel.x == box.max.x ? 2u : 0u) |
+         (voxel.y == box.min.y ? 4u : 0u) | (voxel.y == box.max.y ? 8u : 0u) |
+         (voxel.z == box.min.z ? 16u : 0u) | (voxel.z == box.max.z ? 32u : 0u);
+}
+inline constexpr unsigned kAllFaces = 63;
+/// As many voxels as there are faces of a box suffice to touch them all.
+inline constexpr std::size_t kMostBoxVoxels = 6;
+
+/// The faces of the active box that masks of a volume's bricks touch.
+/// \param masks  have no voxel outside the box
+[[nodiscard]] unsigned touchedFaces(const SparseVolume& volume, const Box& box,
+                                    std::span<const BrickMask> masks);
+
+/// A few active voxels of a volume that together touch faces of its active box, so that the box stays the
+/// same if they stay active. A voxel that touches several faces comes first, and among equals the one that
+/// differs most from the background.
+/// \param box    the active box
+/// \param faces  faces to touch, or all
+/// \return at most kMostBoxVoxels index coordinates, increasing
+[[nodiscard]] std::vector<Coord> boxVoxels(const SparseVolume& volume, const Box& box,
+                                           unsigned faces = kAllFaces);
+
 struct ValueRange {
   float min = 0.0f, max = 0.0f;
 

@@ -49,13 +49,12 @@ void numberBricks(CellField& cells, std::vector<Coord> reached, const Revoxelise
   if (!voxels.restrictToBricks) return;
   for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
     cells.corners.push_back(cornersIn(given, cells.table.place(i)));
-  // The masks or the levels of the voxels at the corners of the bricks.
+  // The masks of the voxels at the corners of the bricks.
   cells.masks.assign(voxels.masks.begin(), voxels.masks.end());
-  cells.blockLevels.assign(voxels.levels.begin(), voxels.levels.end());
-  if (cells.masks.empty() && cells.blockLevels.empty()) return;
+  if (cells.masks.empty()) return;
   for (std::size_t i = 0; i < cells.table.bricks.size(); ++i)
     for (int c = 0; c < kCellCorners; ++c)
-      cells.ruleOf.push_back(given.find(cells.table.place(i) + stepToCorner(c)));
+      cells.maskOf.push_back(given.find(cells.table.place(i) + stepToCorner(c)));
 }
 
 }  // namespace
@@ -85,11 +84,12 @@ CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels) {
   cells.kernels = std::move(gathered.kernels);
   cells.origins = std::move(gathered.origins);
   cells.box = voxels.box;
+  cells.alwaysActive.assign(voxels.alwaysActive.begin(), voxels.alwaysActive.end());
   cells.rule = makeVoxelRule(field.background, voxels);
   return cells;
 }
 
-static_assert(CellFieldView::kNoRule == BrickIndex::kNone, "masks are numbered by brick");
+static_assert(CellFieldView::kNoMask == BrickIndex::kNone, "masks are numbered by brick");
 
 DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
     : rule_(field.rule),
@@ -101,8 +101,8 @@ DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
       ellipsoid_(field.ellipsoid, stream),
       corners_(field.corners, stream),
       masks_(field.masks, stream),
-      blockLevels_(field.blockLevels, stream),
-      ruleOf_(field.ruleOf, stream) {
+      maskOf_(field.maskOf, stream),
+      alwaysActive_(field.alwaysActive, stream) {
   add(DeviceLevel(field.table, stream));
 }
 
@@ -117,9 +117,10 @@ CellFieldView DeviceCells::view() const {
                      .ellipsoid = ellipsoid_.data(),
                      .corners = corners_.data(),
                      .masks = masks_.data(),
-                     .blockLevels = blockLevels_.data(),
-                     .ruleOf = ruleOf_.data(),
+                     .maskOf = maskOf_.data(),
                      .box = box_,
+                     .alwaysActive = alwaysActive_.data(),
+                     .alwaysActiveCount = std::uint32_t(alwaysActive_.size()),
                      .rule = rule_};
   for (int l = 0; l < levelCount(); ++l)
     view.levels[l] = {level(l).table().origin, level(l).first(), level(l).count(),
@@ -129,8 +130,8 @@ CellFieldView DeviceCells::view() const {
 
 std::size_t DeviceCells::bytes() const {
   std::size_t bytes = forms_.bytes() + kernels_.bytes() + origins_.bytes() + begin_.bytes() +
-                      ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() +
-                      blockLevels_.bytes() + ruleOf_.bytes();
+                      ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() + maskOf_.bytes() +
+                      alwaysActive_.bytes();
   for (const DeviceLevel& level : levels_) bytes += level.bytes();
   return bytes;
 }

@@ -72,13 +72,12 @@ struct CellField {
   /// By brick: bit c is set if voxels in the brick of corner c (core/geometry.h) may differ from
   /// the background. Empty: all may.
   std::vector<std::uint8_t> corners;
-  /// The masks by which voxels are active, or the levels of their thresholds (ellipsoids.h), and
-  /// for each brick and corner the number of those of the voxels there, or BrickIndex::kNone.
-  /// Otherwise empty.
+  /// The masks by which voxels are active, and for each brick and corner the number of that of the
+  /// voxels there, or BrickIndex::kNone. Otherwise empty.
   std::vector<BrickMask> masks;
-  std::vector<BlockLevels> blockLevels;
-  std::vector<std::uint32_t> ruleOf;
-  Box box;  ///< no voxel outside it is active
+  std::vector<std::uint32_t> maskOf;
+  Box box;                          ///< no voxel outside it is active
+  std::vector<Coord> alwaysActive;  ///< voxels that are active whatever their values
   VoxelRule rule;
 };
 
@@ -107,13 +106,13 @@ struct CellFieldView {
   const Coord* origins;
   const std::uint32_t *begin, *ellipsoid;
   const std::uint8_t* corners;  ///< null: all voxels may differ from the background
-  /// Masks of active voxels, or levels of their thresholds; null: there are none. Their numbers by
-  /// brick and corner, or kNoRule.
-  static constexpr std::uint32_t kNoRule = 0xffffffffu;
+  /// Masks of active voxels; null: there are none. Their numbers by brick and corner, or kNoMask.
+  static constexpr std::uint32_t kNoMask = 0xffffffffu;
   const BrickMask* masks;
-  const BlockLevels* blockLevels;
-  const std::uint32_t* ruleOf;
-  Box box;  ///< no voxel outside it is active
+  const std::uint32_t* maskOf;
+  Box box;                    ///< no voxel outside it is active
+  const Coord* alwaysActive;  ///< voxels that are active whatever their values
+  std::uint32_t alwaysActiveCount;
   VoxelRule rule;
 };
 
@@ -145,8 +144,8 @@ class DeviceCells {
   DeviceBuffer<std::uint32_t> begin_, ellipsoid_;
   DeviceBuffer<std::uint8_t> corners_;
   DeviceBuffer<BrickMask> masks_;
-  DeviceBuffer<BlockLevels> blockLevels_;
-  DeviceBuffer<std::uint32_t> ruleOf_;
+  DeviceBuffer<std::uint32_t> maskOf_;
+  DeviceBuffer<Coord> alwaysActive_;
 };
 
 struct DecodeArguments {

@@ -147,21 +147,25 @@ __device__ bool mayDiffer(const CellFieldView& field, std::uint32_t brick, int c
   return field.corners == nullptr || (field.corners[brick] >> corner & 1u) != 0;
 }
 
-/// Whether a voxel of this settled value is active, apart from the box.
-__device__ bool isActive(const CellFieldView& field, std::uint32_t brick, const Coord& voxel,
+__device__ bool isAlwaysActive(const CellFieldView& field, const Coord& voxel) {
+  for (std::uint32_t n = 0; n < field.alwaysActiveCount; ++n)
+    if (field.alwaysActive[n] == voxel) return true;
+  return false;
+}
+
+/// Whether a voxel of this settled value is active, apart from the box. \param local  its place in the brick
+__device__ bool isActive(const CellFieldView& field, const BlockBrick& brick, const Coord& local,
                          float settled) {
-  if (field.ruleOf == nullptr) return field.rule.isActive(settled);
-  const std::uint32_t rule = field.ruleOf[brick * kCellCorners + cornerOf(voxel)];
-  if (rule == CellFieldView::kNoRule) return false;
-  const int offset = voxelOffset(localOf(voxel));
-  if (field.masks != nullptr) return field.masks[rule].test(offset);
-  return field.rule.isActive(settled, field.blockLevels[rule].at(offset));
+  if (field.masks == nullptr)
+    return field.rule.isActive(settled) || isAlwaysActive(field, brick.corner + local);
+  const std::uint32_t mask = field.maskOf[brick.number * kCellCorners + cornerOf(local)];
+  return mask != CellFieldView::kNoMask && field.masks[mask].test(voxelOffset(localOf(local)));
 }
 
 /// The voxel that a sum becomes. \param local  its place in the brick
-__device__ float voxelOf(const CellFieldView& field, std::uint32_t brick, const LocalBox& box,
+__device__ float voxelOf(const CellFieldView& field, const BlockBrick& brick, const LocalBox& box,
                          const Coord& local, float sum) {
-  if (!mayDiffer(field, brick, cornerOf(local))) return field.rule.background;
+  if (!mayDiffer(field, brick.number, cornerOf(local))) return field.rule.background;
   const float settled = field.rule.settled(sum);
   const bool active =
       box.contains(local.x, local.y, local.z) && isActive(field, brick, local, settled);
@@ -177,7 +181,7 @@ __device__ bool decodeAs(const CellFieldView& field, const BlockBrick& brick, Su
   const LocalBox box = localBox(field.box, brick.corner, kSide - 1);
   bool any = false;
   for (int v = int(threadIdx.x); v < Cube<kSide>::kVoxels; v += kThreads) {
-    const float value = voxelOf(field, brick.number, box, Cube<kSide>::place(v),
+    const float value = voxelOf(field, brick, box, Cube<kSide>::place(v),
                                 field.rule.background + float(sums[v]) * unit);
     any |= value != field.rule.background;
     out[v] = value;

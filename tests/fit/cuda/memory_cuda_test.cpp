@@ -14,7 +14,7 @@
 #include "../random_ellipsoids.h"
 #include "../volumes.h"
 #include "core/cuda/device_buffer.h"
-#include "esvr/convert.h"
+#include "esvr/encode.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "fit/cuda/memory_plan.h"
 #include "gpu_test.h"

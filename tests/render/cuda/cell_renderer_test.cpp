@@ -125,14 +125,11 @@ TEST_F(CellsOnGpu, DrawTheVoxelsOfMasksWithinABox) {
   }
 }
 
-TEST_F(CellsOnGpu, DrawTheVoxelsOfThresholdsOfBlocks) {
+TEST_F(CellsOnGpu, DrawVoxelsThatAreAlwaysActive) {
   const Field field = manyBlobs();
-  const auto bricks = reachedBricks(field, kBox);
-  std::vector<BlockLevels> levels(bricks.size());
-  for (std::size_t b = 0; b < levels.size(); ++b)
-    for (std::size_t n = 0; n < kBlocksOfBrick; ++n) levels[b].of[n] = std::uint8_t(n * b % 17);
-  const RevoxeliseOptions rule{
-      .threshold = 0.03f, .bricks = bricks, .restrictToBricks = true, .levels = levels};
+  std::vector<Coord> always;
+  for (std::int32_t n = 0; n < 30; ++n) always.push_back(kBox.min + Coord{n, 10 + n % 7, 8});
+  const RevoxeliseOptions rule{.threshold = 0.5f, .alwaysActive = always};
   const SparseVolume volume = revoxelise(field, rule);
   const auto drawn = makeFieldRenderer(field, device_, {}, rule);
   expectClose(drawn->draw(options(70.0)), renderVolume(volume, options(70.0)), 1000);

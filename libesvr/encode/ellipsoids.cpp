@@ -1,0 +1,530 @@
+#include "encode/ellipsoids.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "core/add_seconds.h"
+#include "encode/root_search.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+#include "format/section_table.h"
+
+namespace esvr::encode {
+
+// ---- What a job says
+
+bool isCancelled(const Job& job) {
+  const CancelToken* cancel = job.options.fit.cancel;
+  return cancel && cancel->cancelled();
+}
+
+double psnrOf(const Job& job, const SparseVolume& volume) {
+  return psnrOverBox(job.input.source, volume,
+                     {.box = job.options.fit.box, .peak = job.options.fit.peak});
+}
+
+double psnrOf(const Job& job, const StoredGrid& grid) {
+  return psnrOf(job, decodeGrid(grid, {.memory = memoryOf(job.input.source)}));
+}
+
+Representation representationOf(const Job& job) {
+  if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
+  return job.options.representation;
+}
+
+Plan planOf(const Job& job) {
+  const Tuning& tuning = kTuning;
+  const int effort = job.options.effort;
+  // A step of effort below the middle halves the time of a fit; above it, fits take half as long again.
+  const double factor = std::pow(effort < kUsualEffort ? 2.0 : 1.5, effort - kUsualEffort);
+  const double wanted = plannedIterations(job.options.fit);
+  const double bricks = double(std::max<std::size_t>(job.input.source.brickCount(), 1));
+  const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;
+  const double share = onGpu ? 1.0 : std::min(1.0, tuning.bricksOfWholeFit / bricks);
+  Plan plan;
+  plan.wholeIterations = std::uint32_t(std::max(std::ceil(factor * share * wanted), 1.0));
+  plan.fitsInTime = plan.wholeIterations >= std::min<double>(tuning.leastShortIterations, wanted);
+  plan.wholeIterations = std::max(
+      plan.wholeIterations, std::uint32_t(std::min<double>(tuning.leastShortIterations, wanted)));
+  plan.shortIterations = std::min(plan.wholeIterations,
+                                  std::clamp(plan.wholeIterations / 4, tuning.leastShortIterations,
+                                             tuning.mostShortIterations));
+  const bool thorough = job.options.fit.preset == Preset::kHigh || effort > kUsualEffort;
+  plan.wholeFits = thorough ? 3 : 2;
+  return plan;
+}
+
+bool saturates(const SparseVolume& volume) {
+  const ValueRange range = activeRange(volume);
+  const auto isExtreme = [&](float v) {
+    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
+  };
+  std::uint64_t extreme = 0;
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    extreme +=
+        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
+  return double(extreme) >= kTuning.saturatedShare * double(activeVoxelCount(volume));
+}
+
+// ---- The stored grid of a fit
+
+namespace {
+
+/// PSNR of the sum over the box at the end of a fit, as the device of the fit measures it.
+double lastPsnr(const FitResult& fit) { return fit.curve.empty() ? 0.0 : fit.curve.back().psnrBox; }
+
+/// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
+/// cancelled meanwhile. Rate control passes over the whole volume on the device of the fit, or on the
+/// CPU if the fit was divided into chunks, because the volume may not fit into the GPU's memory.
+CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
+                          CompactOptions target) {
+  const FitOptions& wanted = job.options.fit;
+  target.box = wanted.box;
+  target.peak = wanted.peak;
+  target.device = fit.chunks > 1 ? Device{} : wanted.device;
+  auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
+    if (fit.end == FitEnd::kCancelled) return std::nullopt;
+    return compactGrid(grid, job.input.source, target);
+  });
+  if (found) return std::move(*found);
+  const BestSoFar completion;
+  target.quick = true;
+  return compactGrid(grid, job.input.source, target);
+}
+
+Conversion conversionOf(FitResult fit, CompactResult compact) {
+  Conversion conversion;
+  conversion.grid = std::move(compact.grid);
+  conversion.fit = std::move(fit);
+  conversion.compact = CompactRecord{compact.loss, compact.steps};
+  return conversion;
+}
+
+}  // namespace
+
+StoredGrid storedGridOf(const Job& job, FitResult& fit) {
+  const auto made = [&](Activity activity) {
+    return makeStoredGrid(job.input.descriptor, job.input.source, fit.field, activity);
+  };
+  const Activity wanted = job.options.storage.activity;
+  auto grid = unlessCancelled([&]() -> std::optional<StoredGrid> {
+    if (fit.end == FitEnd::kCancelled) return std::nullopt;
+    return made(wanted);
+  });
+  if (!grid) {
+    const BestSoFar completion;
+    fit.end = FitEnd::kCancelled;
+    grid = made(wanted);
+  }
+  fit.field = {};
+  return std::move(*grid);
+}
+
+Conversion storedAs(const Job& job, FitResult fit, StoredGrid grid, const CompactOptions& target) {
+  if (job.options.storage.form == Storage::kFloat32) {
+    Conversion conversion;
+    conversion.fit = std::move(fit);
+    conversion.grid = std::move(grid);
+    return conversion;
+  }
+  CompactResult compact = compactedTo(job, grid, fit, target);
+  return conversionOf(std::move(fit), std::move(compact));
+}
+
+double psnrOf(const Job& job, const Conversion& conversion) {
+  const auto measured = unlessCancelled([&]() -> std::optional<double> {
+    if (isCancelled(job)) return std::nullopt;
+    return psnrOf(job, conversion.grid);
+  });
+  if (measured) return *measured;
+  return lastPsnr(conversion.fit) - (conversion.compact ? conversion.compact->loss : 0.0);
+}
+
+std::uint64_t bytesOfEllipsoids(const StoredGrid& grid) {
+  const BestSoFar completion;
+  return bytesAdded(grid);
+}
+
+// ---- Fits
+
+namespace {
+
+/// A fit continues an earlier one that has at most 1.18 times and at least two thirds of its
+/// ellipsoids. Where more are dropped, a fit from seeds is better (dragon, 0.6 times as many: 49.4 dB,
+/// and 47.3 dB continued).
+constexpr double kLeastGrowth = 0.85, kMostGrowth = 1.5;
+/// A continued fit of fewer ellipsoids starts from this share of them, and a short fit has this share
+/// of the expected number. New ones then find the places that miss those that were dropped.
+constexpr double kGrownFrom = 0.9;
+/// Factor of the number up to which a short fit is extrapolated, and the short fits that are made until
+/// one is that near.
+constexpr double kNear = 1.3;
+constexpr int kMostDrafts = 3;
+/// Largest number of ellipsoids of the first of them, which scouts.
+constexpr double kMostOfFirstDraft = 6000.0;
+/// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
+constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
+/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
+/// size is given up, and the share of a size that may stay unused: a hundredth.
+constexpr double kMoreEach = 1.25;
+constexpr int kFitsUntilOneIsSmall = 5;
+constexpr std::uint64_t kRefillDivisor = 100;
+/// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
+constexpr double kMinSlopeRatio = 1.15, kMinSlope = kDbPerDoubling / 2.0;
+
+/// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
+/// the size hardly differs.
+struct Margin {
+  double aim, min, max;
+};
+constexpr Margin kCompactMargin{kTuning.usualLoss, 0.35, 2.0};
+constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
+
+double countOf(const Attempt& a) { return double(std::max<std::size_t>(a.count(), 1)); }
+
+/// The number of ellipsoids at which the PSNR should be reached, if it grows from an attempt's by a
+/// slope in dB per doubling.
+double countFor(const Attempt& from, double psnr, double slope) {
+  return countOf(from) * std::exp2((psnr - from.psnr) / slope);
+}
+
+}  // namespace
+
+EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
+    : options_(job.options),
+      job_{job.input, options_},
+      goal_(goal),
+      plan_(planOf(job)),
+      compact_(job.options.storage.form == Storage::kCompact),
+      saturates_(saturates(job.input.source)),
+      behind_(saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind),
+      maxCount_(activeVoxelCount(job.input.source)) {
+  if (goal.psnr && options_.fit.count)
+    maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
+  if (goal.below) stayBelow(*goal.below);
+}
+
+void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
+  goal_.below = bytes;
+  maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kTuning.leastBytesEach) + 1);
+}
+
+FitOptions EllipsoidSearch::optionsFor(double count, std::uint32_t iterations) const {
+  FitOptions options = options_.fit;
+  const double most = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
+  options.count = std::size_t(std::clamp(std::floor(count), 1.0, most));
+  options.psnr.reset();
+  options.seconds.reset();
+  options.iterations = iterations;
+  return options;
+}
+
+Attempt EllipsoidSearch::attempted(const FitOptions& options) const {
+  Attempt result;
+  result.asked = *options.count;
+  result.fit = fit(job_.input.source, options);
+  result.grid = storedGridOf(job_, result.fit);
+  const auto psnr = unlessCancelled([&]() -> std::optional<double> {
+    if (result.cancelled()) return std::nullopt;
+    return psnrOf(job_, result.grid);
+  });
+  if (!psnr) result.fit.end = FitEnd::kCancelled;
+  result.psnr = psnr.value_or(lastPsnr(result.fit));
+  return result;
+}
+
+Attempt EllipsoidSearch::shortFit(double count) const {
+  return attempted(optionsFor(count, plan_.shortIterations));
+}
+
+/// The attempt whose number of ellipsoids is nearest to a number and from which a fit can continue;
+/// null if there is none.
+const Attempt* EllipsoidSearch::startFor(double count) const {
+  const Attempt* start = nullptr;
+  const auto distance = [&](const Attempt& a) { return std::abs(std::log(countOf(a) / count)); };
+  const auto consider = [&](const Attempt& a) {
+    const double growth = count / countOf(a);
+    if (a.cancelled() || growth < kLeastGrowth || growth > kMostGrowth) return;
+    if (!start || distance(a) <= distance(*start)) start = &a;
+  };
+  // Where many voxels saturate, a continued fit is worse (dragon: 46.8 dB instead of 48.2).
+  if (draft_ && !saturates_) consider(*draft_);
+  for (const Attempt& a : attempts_) consider(a);
+  return start;
+}
+
+/// A whole fit. Where it can continue an earlier one, it adds ellipsoids or drops the weakest, and has
+/// fewer iterations. The first fit for a size begins with seeds: of as many iterations, these give a
+/// better fit than a short one does (a plume of 20 KB: 0.7 dB), but one that is less like its forecast,
+/// by which a PSNR is found with one fit less.
+Attempt EllipsoidSearch::wholeFit(double count) const {
+  FitOptions options = optionsFor(count, plan_.wholeIterations);
+  const auto iterationsOf = [&](double share) {
+    return std::max(std::uint32_t(share * plan_.wholeIterations), 1u);
+  };
+  const Attempt* from = startFor(double(*options.count));
+  const bool isShort = from && draft_ && from == &*draft_;
+  if (goal_.bytes && (!from || isShort)) {
+    if (!saturates_) options.iterations = iterationsOf(kTuning.sizedShare);
+    return attempted(options);
+  }
+  if (!from) return attempted(options);
+  options.iterations = iterationsOf(isShort ? kTuning.continuedShare : kTuning.continuedWholeShare);
+  const bool grows = kGrownFrom * double(*options.count) >= double(from->count());
+  const StoredGrid fewer =
+      grows ? StoredGrid{} : heaviest(from->grid, std::size_t(kGrownFrom * double(*options.count)));
+  options.start = grows ? &from->grid.field : &fewer.field;
+  return attempted(options);
+}
+
+CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions target) const {
+  return compactedTo(job_, attempt.grid, attempt.fit, target);
+}
+
+Conversion EllipsoidSearch::stored(Attempt attempt, const CompactOptions& target) const {
+  Conversion conversion = storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), target);
+  conversion.decisions.bothSigns = bothSigns_;
+  return conversion;
+}
+
+// ---- Short fits
+
+double EllipsoidSearch::aim() const {
+  return *goal_.psnr + (compact_ ? kCompactMargin : kFloat32Margin).aim;
+}
+
+double EllipsoidSearch::capped(double count) const {
+  return std::clamp(count, 1.0, double(std::max<std::uint64_t>(maxCount_, 1)));
+}
+
+/// The number of ellipsoids with which a whole fit should reach a PSNR.
+double EllipsoidSearch::forecastCount(double psnr) const {
+  const double count = countFor(*draft_, psnr - behind_, slope_);
+  return std::clamp(count, countOf(*draft_) / kMaxGrowth, countOf(*draft_) * kMaxGrowth);
+}
+
+/// A short fit whose number of ellipsoids is near the one that the PSNR needs. The first guess can be
+/// far from it, where signs and prices differ.
+void EllipsoidSearch::draftNearPsnr() {
+  double guess = double(activeVoxelCount(job_.input.source)) / kTuning.voxelsOfFirstGuess;
+  // Where ellipsoids win, they usually take about half of the bytes.
+  if (goal_.below) guess = std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach);
+  draft_ = shortFit(capped(std::min(guess, kMostOfFirstDraft)));
+  for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
+    if (draft_->cancelled() || !mayStayBelow(goal_.below.value_or(UINT64_MAX))) return;
+    const double count = capped(kGrownFrom * forecastCount(aim()));
+    const double ratio = count / countOf(*draft_);
+    if (std::max(ratio, 1.0 / ratio) <= kNear) return;
+    auto nearer = unlessCancelled([&]() -> std::optional<Attempt> { return shortFit(count); });
+    if (!nearer) {
+      draft_->fit.end = FitEnd::kCancelled;
+      return;
+    }
+    const double doublings = std::log2(countOf(*nearer) / countOf(*draft_));
+    if (std::abs(doublings) >= std::log2(kMinSlopeRatio))
+      slope_ = std::clamp((nearer->psnr - draft_->psnr) / doublings, kMinSlope,
+                          2.0 * kTuning.steepestDbPerDoubling);
+    draft_ = std::move(nearer);
+  }
+}
+
+/// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each other
+/// need more bits, so that the PSNR alone would not do.
+double EllipsoidSearch::qualityForBytes(const Attempt& attempt) const {
+  const CompactResult compact = compacted(attempt, {.loss = kTuning.usualLoss, .quick = true});
+  const double doublings = std::log2(double(std::max<std::uint64_t>(compact.bytes, 1)));
+  return attempt.psnr - compact.loss - kDbPerDoubling * doublings;
+}
+
+/// Decides whether intensities have both signs, unless the options say so: where many voxels have an
+/// extreme value and the volume is no narrow band, another short fit with both signs is compared.
+void EllipsoidSearch::decideSigns() {
+  FitOptions& fit = options_.fit;
+  if (draft_->cancelled() || fit.bothSigns || fit.narrowBand || !saturates_) return;
+  double seconds = 0.0;
+  auto found = addSeconds(seconds, [&] {
+    return unlessCancelled([&]() -> std::optional<Attempt> {
+      fit.bothSigns = true;
+      Attempt both = shortFit(double(draft_->asked));
+      if (qualityForBytes(both) < qualityForBytes(*draft_) + kTuning.signsGain) return std::nullopt;
+      return both;
+    });
+  });
+  fit.bothSigns = found.has_value();
+  if (found) draft_ = std::move(found);
+  bothSigns_ = {.tried = true, .used = *fit.bothSigns, .seconds = seconds};
+  if (isCancelled(job_)) draft_->fit.end = FitEnd::kCancelled;
+}
+
+/// Takes the price of an ellipsoid and the bytes of the other sections from the short fit. The price is
+/// known to a fifth without a search for the best steps, which decides enough for a PSNR. The number of
+/// ellipsoids of a size follows from it.
+void EllipsoidSearch::forecast() {
+  if (draft_->cancelled() || !compact_) return;
+  const bool isQuick = goal_.psnr.has_value();
+  const CompactResult compact = compacted(*draft_, {.loss = kTuning.usualLoss, .quick = isQuick});
+  price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
+  const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
+  besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
+  const double bytes =
+      goal_.psnr ? price_ * countFor(*draft_, aim() - behind_, slope_) : double(*goal_.bytes);
+  const double share = std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  plan_.wholeIterations = std::max(std::min(plan_.shortIterations, plan_.wholeIterations),
+                                   std::uint32_t(share * plan_.wholeIterations));
+  // A whole fit of less than four times the iterations gains less.
+  const double longer = double(plan_.wholeIterations) / double(plan_.shortIterations);
+  behind_ *= std::clamp(0.5 * std::log2(longer), 0.0, 1.0);
+  if (goal_.psnr)
+    expectedBytes_ =
+        std::uint64_t(double(besides_) + price_ * countFor(*draft_, aim() - behind_, slope_));
+}
+
+void EllipsoidSearch::draft(const CancelToken* cancel) {
+  const CancelToken* own = options_.fit.cancel;
+  if (cancel) options_.fit.cancel = cancel;
+  if (goal_.psnr)
+    draftNearPsnr();
+  else
+    draft_ = shortFit(kGrownFrom * double(*goal_.bytes) / kTuning.usualBytesEach);
+  if (!goal_.below || mayStayBelow(*goal_.below)) decideSigns();
+  forecast();
+  options_.fit.cancel = own;
+}
+
+double EllipsoidSearch::expectedPsnr() const {
+  return draft_->psnr + (draft_->cancelled() ? 0.0 : behind_) - kTuning.usualLoss;
+}
+
+bool EllipsoidSearch::mayReach(double psnr) const {
+  return draft_->cancelled() || expectedPsnr() + kTuning.uncertainty >= psnr;
+}
+
+bool EllipsoidSearch::mayStayBelow(std::uint64_t bytes) const {
+  if (draft_->cancelled()) return true;
+  const double slope = expectedBytes_ > 0 ? slope_ : kTuning.steepestDbPerDoubling;
+  const double count = countFor(*draft_, aim() - behind_ - kTuning.uncertainty, slope);
+  return count <= double(maxCount_) && double(besides_) + price_ * count <= double(bytes);
+}
+
+// ---- Whole fits
+
+std::optional<Conversion> EllipsoidSearch::run() { return goal_.psnr ? runToPsnr() : runToSize(); }
+
+/// The number of ellipsoids grows with their PSNR: a root search over its logarithm.
+std::optional<Conversion> EllipsoidSearch::runToPsnr() {
+  const Margin margin = compact_ ? kCompactMargin : kFloat32Margin;
+  RootSearch search({0.0, std::log2(capped(HUGE_VAL)), std::log2(kMinGrowth)}, aim(), slope_,
+                    std::log2(capped(forecastCount(aim()))));
+  while (!draft_->cancelled() && int(attempts_.size()) < plan_.wholeFits) {
+    const double count = std::max(std::floor(std::exp2(search.next())), 1.0);
+    const bool isRepeated =
+        std::ranges::any_of(attempts_, [&](const Attempt& a) { return double(a.asked) == count; });
+    if (isRepeated) break;
+    auto found = unlessCancelled([&]() -> std::optional<Attempt> { return wholeFit(count); });
+    if (!found) {
+      for (Attempt& a : attempts_) a.fit.end = FitEnd::kCancelled;
+      break;
+    }
+    attempts_.push_back(std::move(*found));
+    const Attempt& last = attempts_.back();
+    const double over = last.psnr - *goal_.psnr;
+    const bool allThereIs = last.fit.deviceFull || double(last.asked) >= capped(HUGE_VAL);
+    if (last.cancelled() || (over >= margin.min && over <= margin.max)) break;
+    if (over < margin.min && allThereIs) break;
+    search.learn(last.psnr);
+  }
+  if (attempts_.empty()) {
+    draft_->fit.end = FitEnd::kCancelled;
+    return stored(std::move(*draft_), {.psnr = goal_.psnr});
+  }
+  return smallestOrBest();
+}
+
+/// The smallest conversion of the attempts that reach the PSNR; otherwise the best one, as missed.
+Conversion EllipsoidSearch::smallestOrBest() {
+  const Margin margin = compact_ ? kCompactMargin : kFloat32Margin;
+  const auto worse = [](const Attempt& a, const Attempt& b) { return a.psnr < b.psnr; };
+  std::ranges::sort(attempts_, worse);
+  const auto reached =
+      std::ranges::find_if(attempts_, [&](const Attempt& a) { return a.psnr > *goal_.psnr; });
+  if (reached == attempts_.end()) {
+    if (!attempts_.back().cancelled()) attempts_.back().fit.end = FitEnd::kPsnrMissed;
+    return stored(std::move(attempts_.back()), {.psnr = goal_.psnr});
+  }
+  // Those near the aim may be the smallest; others are larger than the one with the lowest PSNR.
+  std::optional<Conversion> smallest;
+  std::uint64_t fewest = 0;
+  for (auto a = reached; a != attempts_.end(); ++a) {
+    const bool isNear = a->psnr - *goal_.psnr >= margin.min && a->psnr - *goal_.psnr <= margin.max;
+    if (smallest && !isNear) break;
+    if (!a->cancelled()) a->fit.end = FitEnd::kPsnrReached;
+    Conversion now = stored(std::move(*a), {.psnr = goal_.psnr});
+    const std::uint64_t bytes = bytesOfEllipsoids(now.grid);
+    if (!smallest || bytes < fewest) smallest = std::move(now), fewest = bytes;
+  }
+  return std::move(*smallest);
+}
+
+/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger or smaller
+/// than those of the attempt before; the bytes are then divided again.
+/// \return nothing if the other sections take all bytes
+std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
+  for (int n = 0;; ++n) {
+    if (besides_ >= *goal_.bytes) return std::nullopt;
+    CompactResult now = compacted(attempt, {.bytes = *goal_.bytes - besides_});
+    const std::uint64_t padding = now.grid.field.chunks.size() * (format::kAlignment - 1);
+    const std::uint64_t besides = bytesOfEllipsoids(now.grid) - now.bytes + padding;
+    const bool larger = besides > besides_ + padding;
+    const bool muchSmaller = besides_ > besides + padding + *goal_.bytes / kRefillDivisor;
+    if (n > 0 || !(larger || muchSmaller)) {
+      needed_ = besides_ + now.bytes;
+      return now;
+    }
+    besides_ = besides;
+  }
+}
+
+/// As many ellipsoids as the size allows. Where they take more bytes than expected, or would lose too
+/// much by rounding, the fit is repeated with fewer.
+std::optional<Conversion> EllipsoidSearch::runToSize() {
+  std::optional<Conversion> best;
+  double quality = 0.0, each = price_;
+  const auto take = [&](Attempt attempt, CompactResult now) {
+    quality = attempt.psnr - now.loss;
+    best = conversionOf(std::move(attempt.fit), std::move(now));
+    best->decisions.bothSigns = bothSigns_;
+  };
+  for (int fits = 0; fits < (best ? plan_.wholeFits : kFitsUntilOneIsSmall); ++fits) {
+    if (draft_->cancelled() || besides_ >= *goal_.bytes) break;
+    const double count = double(*goal_.bytes - besides_) / each;
+    auto attempt = unlessCancelled([&]() -> std::optional<Attempt> { return wholeFit(count); });
+    if (!attempt) {
+      draft_->fit.end = FitEnd::kCancelled;
+      break;
+    }
+    auto now = filled(*attempt);
+    if (!now) break;
+    const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= kTuning.mostLoss;
+    const bool isLast = attempt->cancelled() || (isSmall && isGood) || attempt->asked == 1;
+    if (!isLast)
+      each = std::max(
+          double(compacted(*attempt, {.loss = kTuning.usualLoss}).bytes) / countOf(*attempt),
+          kMoreEach * each);
+    attempts_.assign(1, *attempt);  // the next fit may continue it
+    if (isSmall && (!best || attempt->psnr - now->loss > quality))
+      take(std::move(*attempt), std::move(*now));
+    if (isLast) break;
+  }
+  if (best || !draft_->cancelled()) return best;
+  // Nothing was found before the cancellation: the last fit is completed.
+  Attempt last = std::move(attempts_.empty() ? *draft_ : attempts_.front());
+  last.fit.end = FitEnd::kCancelled;
+  auto now = filled(last);
+  if (!now || needed_ > *goal_.bytes) throw Cancelled();
+  take(std::move(last), std::move(*now));
+  return best;
+}
+
+}  // namespace esvr::encode

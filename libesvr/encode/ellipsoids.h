@@ -1,0 +1,127 @@
+#pragma once
+/// The search for ellipsoids that have a PSNR or a size: a short fit, which forecasts the number and
+/// the bytes of the ellipsoids, and then one or two whole fits.
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "encode/job.h"
+#include "encode/tuning.h"
+
+namespace esvr::encode {
+
+/// A fit, and its grid in float32.
+struct Attempt {
+  FitResult fit;          ///< its field was moved to the grid
+  StoredGrid grid;        ///< grid in float32
+  double psnr = 0.0;      ///< dB over the box
+  std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
+
+  [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
+  [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
+};
+
+/// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
+/// are found by value, and the end of the fit becomes kCancelled.
+[[nodiscard]] StoredGrid storedGridOf(const Job& job, FitResult& fit);
+
+/// Makes a conversion of a fit and its grid in float32, in the form that the options want: compacted
+/// to the target unless the storage is kFloat32.
+/// \param target  its loss, psnr and bytes count; the rest follows from the job
+[[nodiscard]] Conversion storedAs(const Job& job, FitResult fit, StoredGrid grid,
+                                  const CompactOptions& target);
+
+/// The PSNR of a conversion over the box, dB: measured, or, if that is cancelled, what the fit and rate
+/// control have measured.
+[[nodiscard]] double psnrOf(const Job& job, const Conversion& conversion);
+
+/// bytesAdded() of a grid of ellipsoids, which takes little time, so that nothing cancels it.
+[[nodiscard]] std::uint64_t bytesOfEllipsoids(const StoredGrid& grid);
+
+/// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
+/// Plan::wholeFits whole fits are made (for a size up to five, if the ellipsoids of none before keep to
+/// it), and at most four short ones: three to find the number of ellipsoids, and one to decide about their
+/// signs.
+class EllipsoidSearch {
+ public:
+  struct Goal {
+    std::optional<double> psnr{};  ///< dB over the box
+    std::optional<std::uint64_t>
+        bytes{};  ///< bytes that the grid may add to a file, without a PSNR
+    /// Bytes that the grid must stay below to be of use, with a PSNR. Fits end early where the grid
+    /// would not.
+    std::optional<std::uint64_t> below{};
+  };
+
+  EllipsoidSearch(const Job& job, const Goal& goal);
+  EllipsoidSearch(const EllipsoidSearch&) = delete;
+  EllipsoidSearch& operator=(const EllipsoidSearch&) = delete;
+
+  /// Sets Goal::below, before the short fits or after them.
+  void stayBelow(std::uint64_t bytes);
+
+  /// Makes the short fits. \param cancel  cancels them alone; null: the job's token does
+  /// \throws Cancelled  they were cancelled before they had a result
+  void draft(const CancelToken* cancel = nullptr);
+
+  /// The PSNR (for a size) or the bytes (for a PSNR) to expect of the whole fits.
+  [[nodiscard]] double expectedPsnr() const;
+  [[nodiscard]] std::uint64_t expectedBytes() const { return expectedBytes_; }
+
+  /// False if the drafts show that the grid cannot stay below a number of bytes, or, for a size, that
+  /// it cannot have a PSNR, even if it is better than expected by Tuning::uncertainty.
+  [[nodiscard]] bool mayStayBelow(std::uint64_t bytes) const;
+  [[nodiscard]] bool mayReach(double psnr) const;
+
+  /// Makes the whole fits. For a PSNR that is missed, the best of them is marked kPsnrMissed.
+  /// \return nothing if the grid does not fit into the size; needed() says what it takes then
+  [[nodiscard]] std::optional<Conversion> run();
+
+  [[nodiscard]] std::uint64_t needed() const { return needed_; }
+  /// True if there is a short fit, and if it was not cancelled.
+  [[nodiscard]] bool hasDraft() const { return draft_.has_value(); }
+  [[nodiscard]] bool drafted() const { return draft_ && !draft_->cancelled(); }
+
+ private:
+  [[nodiscard]] Attempt attempted(const FitOptions& options) const;
+  [[nodiscard]] Attempt shortFit(double count) const;
+  [[nodiscard]] Attempt wholeFit(double count) const;
+  [[nodiscard]] const Attempt* startFor(double count) const;
+  [[nodiscard]] FitOptions optionsFor(double count, std::uint32_t iterations) const;
+  [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
+  [[nodiscard]] Conversion stored(Attempt attempt, const CompactOptions& target) const;
+  [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
+  void draftNearPsnr();
+  void decideSigns();
+  void forecast();
+
+  [[nodiscard]] double aim() const;
+  [[nodiscard]] double capped(double count) const;
+  [[nodiscard]] double forecastCount(double psnr) const;
+  [[nodiscard]] std::optional<Conversion> runToPsnr();
+  [[nodiscard]] std::optional<Conversion> runToSize();
+  [[nodiscard]] std::optional<CompactResult> filled(const Attempt& attempt);
+  [[nodiscard]] Conversion smallestOrBest();
+
+  ConvertOptions options_;
+  Job job_;
+  Goal goal_;
+  Plan plan_;
+  bool compact_, saturates_;
+  double behind_;  ///< PSNR of a whole fit less that of a short one, dB
+  double slope_ = kDbPerDoubling;
+  std::uint64_t maxCount_;
+  Decision bothSigns_;
+  std::optional<Attempt> draft_;
+  double price_ = kTuning.usualBytesEach;  ///< expected bytes of an ellipsoid
+  std::uint64_t besides_ = 0;              ///< bytes of the grid's other sections
+  std::uint64_t expectedBytes_ = 0, needed_ = 0;
+  std::vector<Attempt> attempts_;
+};
+
+/// True if many active voxels have an extreme value of the volume, so that both signs of intensities
+/// may be better.
+[[nodiscard]] bool saturates(const SparseVolume& volume);
+
+}  // namespace esvr::encode

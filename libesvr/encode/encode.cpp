@@ -1,0 +1,595 @@
+// From a volume and a goal to a stored grid. The chapter goes from inside out: goals that voxels and
+// ellipsoids can both reach, the other goals, what a stored grid promises, and convertVolume().
+
+#include "esvr/encode.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "core/add_seconds.h"
+#include "encode/ellipsoids.h"
+#include "encode/signs.h"
+#include "encode/tuning.h"
+#include "encode/voxels.h"
+#include "esvr/error.h"
+#include "esvr/grid.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr::encode {
+namespace {
+
+// ---- Voxels or ellipsoids
+
+Candidate figuresOf(const VoxelCandidate& voxels) {
+  return {voxels.bytes, voxels.psnr, false, voxels.seconds};
+}
+
+/// A conversion to voxels.
+/// \param ellipsoids  the figures of ellipsoids that were considered instead
+Conversion asConversion(VoxelCandidate voxels, const std::optional<Candidate>& ellipsoids,
+                        FitEnd end) {
+  Conversion conversion;
+  conversion.choice = ChoiceRecord{figuresOf(voxels), ellipsoids};
+  conversion.grid = std::move(voxels.grid);
+  conversion.fit.end = end;
+  conversion.decisions.plateau = voxels.plateau;
+  return conversion;
+}
+
+/// True if all active voxels have one value: exact voxels take hardly more than their mask.
+bool isConstant(const SparseVolume& volume) {
+  const ValueRange range = activeRange(volume);
+  return range.min == range.max;
+}
+
+/// Completes the ellipsoids or the voxels for a goal that both can reach, whichever are better.
+class Choice {
+ public:
+  Choice(const Job& job, const VoxelSearch::Goal& goal)
+      : job_(job),
+        wanted_(representationOf(job)),
+        goal_(goal),
+        fitsInTime_(planOf(job).fitsInTime) {}
+
+  /// \param share        share of the voxels' bytes that ellipsoids must be expected to stay below
+  /// \param smallEnough  bytes of voxels below which no ellipsoids are tried
+  Conversion forPsnr(double share, std::uint64_t smallEnough) {
+    if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
+    if (isConstant(job_.input.source))
+      return asConversion(exactVoxels(job_), {}, FitEnd::kPsnrReached);
+    voxels_.emplace(job_, goal_);
+    if (wanted_ == Representation::kVoxels || !fitsInTime_) return completeVoxels();
+    ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.psnr = goal_.psnr});
+    const auto expected = estimateAndDraft(share, smallEnough);
+    if (isCancelled(job_)) return bestSoFar();
+    if (!ellipsoids_->drafted()) return completeVoxels();
+    // An estimate from a sample may be too low or too high.
+    const double margin = expected->estimated ? kTuning.estimateMargin : 1.0;
+    const auto below = std::uint64_t(margin * share * double(expected->bytes));
+    figures_ = Candidate{ellipsoids_->expectedBytes(), *goal_.psnr, true, seconds_};
+    if (!ellipsoids_->mayStayBelow(below)) return completeVoxels();
+    completeEllipsoids();
+    const bool reached = conversion_ && *figures_->psnr >= *goal_.psnr;
+    if (reached && margin * double(figures_->bytes) < double(expected->bytes))
+      return ellipsoidsInsteadOf(expected);
+    if (isCancelled(job_)) return bestSoFar();
+    auto voxels = finishedVoxels();
+    if (!voxels || (reached && figures_->bytes < voxels->bytes))
+      return ellipsoidsInsteadOf(voxels ? figuresOf(*voxels) : expected);
+    return asConversion(std::move(*voxels), figures_, FitEnd::kPsnrReached);
+  }
+
+  Conversion forSize() {
+    if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
+    voxels_.emplace(job_, goal_);
+    if (wanted_ == Representation::kVoxels || exactFits()) return completeVoxels();
+    if (!fitsInTime_ && voxels_->estimate()) return completeVoxels();
+    ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.bytes = goal_.bytes});
+    seconds_ += secondsOf([&] { ellipsoids_->draft(); });
+    figures_ = Candidate{*goal_.bytes, ellipsoids_->expectedPsnr(), true, seconds_};
+    std::optional<Candidate> expected;
+    (void)unlessCancelled([&] {
+      if (isCancelled(job_)) return false;
+      if (voxels_->mayReach(ellipsoids_->expectedPsnr() - kTuning.uncertainty))
+        expected = voxels_->estimate();
+      return true;
+    });
+    if (expected && !isCancelled(job_) && !ellipsoids_->mayReach(*expected->psnr))
+      if (auto voxels = finishedVoxels())
+        return asConversion(std::move(*voxels), figures_, FitEnd::kScheduleDone);
+    completeEllipsoids();
+    const bool isBetter =
+        conversion_ &&
+        (!expected || *figures_->psnr >= *expected->psnr + (expected->estimated ? kSampleDb : 0.0));
+    if (isBetter || (conversion_ && isCancelled(job_)))
+      return ellipsoidsInsteadOf(expected ? expected : voxels_->tooLarge());
+    auto voxels = finishedVoxels();
+    if (!voxels && !conversion_) throw tooSmall(ellipsoids_->needed());
+    if (!voxels || (conversion_ && *figures_->psnr > voxels->psnr))
+      return ellipsoidsInsteadOf(voxels ? figuresOf(*voxels) : expected);
+    return asConversion(std::move(*voxels), figures_, FitEnd::kScheduleDone);
+  }
+
+ private:
+  /// dB by which the PSNR of voxels of a size may be higher than on a sample, whose runs have fewer
+  /// neighbours and whose models learn less.
+  static constexpr double kSampleDb = 3.0;
+  /// Smallest number of active voxels from which on a GPU makes the short fits while the CPU tries
+  /// voxels. Those of smaller volumes are soon tried, and often show that no fit is needed.
+  static constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
+
+  UsageError tooSmall(std::uint64_t needed) const {
+    const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
+                                         : "has no voxels of that size";
+    return UsageError("grid '" + shownName(job_.input.descriptor.name) + "' " + takes +
+                      "; the size allows " + std::to_string(*goal_.bytes));
+  }
+
+  Conversion ellipsoidsAlone() {
+    ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.psnr = goal_.psnr, .bytes = goal_.bytes});
+    ellipsoids_->draft();
+    auto made = ellipsoids_->run();
+    if (!made) throw tooSmall(ellipsoids_->needed());
+    return std::move(*made);
+  }
+
+  /// True if exact voxels keep to the size.
+  bool exactFits() {
+    const Candidate exact = estimateExactVoxels(job_);
+    const double margin = exact.estimated ? kTuning.estimateMargin : 1.0;
+    return double(exact.bytes) * margin <= double(*goal_.bytes);
+  }
+
+  /// Tries voxels on a sample and makes the short fits: at the same time if a GPU makes these, and one
+  /// after the other otherwise, so that the fits know what they have to stay below.
+  std::optional<Candidate> estimateAndDraft(double share, std::uint64_t smallEnough) {
+    const bool onGpu = job_.options.fit.device.kind == DeviceKind::kCuda &&
+                       activeVoxelCount(job_.input.source) >= kMinDraftedVoxels;
+    std::optional<Candidate> expected;
+    const auto draft = [&](const CancelToken* cancel) {
+      seconds_ += secondsOf([&] {
+        (void)unlessCancelled([&] {
+          ellipsoids_->draft(cancel);
+          return true;
+        });
+      });
+    };
+    const auto estimate = [&] { return unlessCancelled([&] { return voxels_->estimate(); }); };
+    if (!onGpu) {
+      expected = estimate();
+      if (!expected || expected->bytes < smallEnough) return expected;
+      ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
+      draft(nullptr);
+      return expected;
+    }
+    CancelToken notNeeded(job_.options.fit.cancel);
+    auto trying = std::async(std::launch::async, [&, token = CancelScope::token()] {
+      const CancelScope scope(token);
+      auto found = estimate();
+      if (found && found->bytes < smallEnough) notNeeded.cancel();
+      return found;
+    });
+    draft(&notNeeded);
+    expected = trying.get();
+    if (expected) ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
+    return expected;
+  }
+
+  void completeEllipsoids() {
+    seconds_ +=
+        secondsOf([&] { conversion_ = unlessCancelled([&] { return ellipsoids_->run(); }); });
+    if (conversion_)
+      figures_ = Candidate{bytesOfEllipsoids(conversion_->grid), psnrOf(job_, *conversion_), false,
+                           seconds_};
+  }
+
+  std::optional<VoxelCandidate> finishedVoxels() {
+    return unlessCancelled([&] { return voxels_->run(); });
+  }
+
+  Conversion completeVoxels() {
+    auto voxels = voxels_->run();
+    if (!voxels) throw tooSmall(0);
+    Conversion conversion = asConversion(std::move(*voxels), figures_,
+                                         goal_.psnr ? FitEnd::kPsnrReached : FitEnd::kScheduleDone);
+    if (isCancelled(job_)) conversion.fit.end = FitEnd::kCancelled;
+    conversion.fitsTookTooLong = !fitsInTime_ && wanted_ == Representation::kAuto;
+    return conversion;
+  }
+
+  Conversion ellipsoidsInsteadOf(const std::optional<Candidate>& voxels) {
+    conversion_->choice = ChoiceRecord{voxels, figures_};
+    if (conversion_->choice->voxels) conversion_->choice->voxels->seconds = voxels_->seconds();
+    conversion_->decisions.plateau = voxels_->plateau();
+    conversion_->decisions.plateau.used = false;
+    return std::move(*conversion_);
+  }
+
+  /// What was found before a cancellation: ellipsoids, or voxels that reach the goal.
+  Conversion bestSoFar() {
+    if (!conversion_ && ellipsoids_->hasDraft()) conversion_ = ellipsoids_->run();
+    if (conversion_) return std::move(*conversion_);
+    return completeVoxels();
+  }
+
+  const Job& job_;
+  Representation wanted_;
+  VoxelSearch::Goal goal_;
+  bool fitsInTime_;       ///< false: a fit would take longer than the effort allows
+  double seconds_ = 0.0;  ///< wall-clock seconds that all fits took together
+  std::optional<VoxelSearch> voxels_;
+  std::optional<EllipsoidSearch> ellipsoids_;
+  std::optional<Conversion> conversion_;  ///< to ellipsoids
+  std::optional<Candidate> figures_;      ///< expected or measured figures of the ellipsoids
+};
+
+/// The result of a single fit, or exact voxels if they take no more bytes. No fit is made if its number
+/// of ellipsoids shows that it cannot be smaller.
+Conversion fitOrExact(const Job& job) {
+  const FitOptions& options = job.options.fit;
+  double seconds = 0.0;
+  const auto fitted = [&] {
+    return addSeconds(seconds, [&] {
+      FitResult made = fit(job.input.source, options);
+      StoredGrid grid = storedGridOf(job, made);
+      grid.curve = withoutTimes(made.curve);
+      return storedAs(job, std::move(made), std::move(grid),
+                      {.loss = CompactOptions{}.loss, .psnr = options.psnr});
+    });
+  };
+  if (representationOf(job) != Representation::kAuto) return fitted();
+  const double count = double(plannedCount(options, activeVoxelCount(job.input.source)));
+  const Candidate expected = estimateExactVoxels(job);
+  std::optional<VoxelCandidate> exact;
+  const auto exactWithin = [&](double bytes) {
+    if (double(expected.bytes) > (expected.estimated ? kTuning.estimateMargin : 1.0) * bytes)
+      return false;
+    if (!exact) exact = unlessCancelled([&] { return std::optional(exactVoxels(job)); });
+    return exact && double(exact->bytes) <= bytes;
+  };
+  if (exactWithin(kTuning.leastBytesEach * count))
+    return asConversion(std::move(*exact),
+                        Candidate{std::uint64_t(kTuning.usualBytesEach * count), {}, true},
+                        FitEnd::kScheduleDone);
+  Conversion conversion = fitted();
+  if (isCancelled(job)) return conversion;
+  // Their PSNR would take a decoding.
+  const Candidate ellipsoids{bytesOfEllipsoids(conversion.grid), {}, false, seconds};
+  if (exactWithin(double(ellipsoids.bytes)))
+    return asConversion(std::move(*exact), ellipsoids, FitEnd::kScheduleDone);
+  conversion.choice = ChoiceRecord{exact ? figuresOf(*exact) : expected, ellipsoids};
+  return conversion;
+}
+
+// ---- Goals
+
+/// The PSNR over the box at which the same sum of squares has a PSNR over the active voxels.
+double boxPsnrFor(const Job& job, double psnrActive) {
+  const SparseVolume& source = job.input.source;
+  const Box box = job.options.fit.box.value_or(activeBox(source));
+  std::uint64_t active = 0;
+  for (std::size_t b = 0; b < source.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      active += source.active[b].test(v) && box.contains(source.brickCorner(b) + voxelLocal(v));
+  const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
+  return psnrActive + 10.0 * std::log10(std::max(share, 1.0));
+}
+
+double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
+  return goal.relative ? goal.bound * valueRangeOf(source) : goal.bound;
+}
+
+/// The largest absolute error that a goal allows; nothing for a goal without a bound.
+std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
+  if (std::holds_alternative<LosslessGoal>(goal)) return 0.0;
+  if (const auto* within = std::get_if<BoundGoal>(&goal)) return absoluteBound(*within, source);
+  return std::nullopt;
+}
+
+/// Calls the conversion that belongs to a goal.
+class Converter {
+ public:
+  explicit Converter(const Job& job) : job_(job) {}
+
+  Conversion operator()(const FitGoal&) const { return fitOrExact(job_); }
+  Conversion operator()(const PresetGoal&) const {
+    ConvertOptions options = job_.options;
+    const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
+    options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
+    const Job job{job_.input, options};
+    return Choice(job, {.psnr = boxPsnrFor(job, presetPsnr(options.fit.preset))})
+        .forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
+  }
+  Conversion operator()(const SizeGoal& goal) const {
+    if (job_.options.storage.form != Storage::kCompact)
+      throw UsageError("a size needs compact storage; the size of float32 storage is fixed");
+    return Choice(job_, {.bytes = goal.bytes}).forSize();
+  }
+  Conversion operator()(const PsnrGoal& goal) const {
+    return Choice(job_, {.psnr = goal.psnr}).forPsnr(1.0, kSmallForPsnr);
+  }
+  Conversion operator()(const BoundGoal& goal) const {
+    const SparseVolume& source = job_.input.source;
+    const double bound = absoluteBound(goal, source);
+    return asVoxels(bound == 0.0 ? exactLayer(source)
+                                 : boundedLayer(source, bound, voxelActivity(job_),
+                                                voxelSigns(job_), decodedValues(job_)));
+  }
+  Conversion operator()(const LosslessGoal&) const {
+    if (job_.input.descriptor.valueType == ValueType::kDouble)
+      throw UsageError(
+          "grid '" + shownName(job_.input.descriptor.name) +
+          "' has values of type double, which are read as float32; a lossless grid cannot hold "
+          "them; choose a bound or a PSNR instead");
+    return asVoxels(exactLayer(job_.input.source));
+  }
+
+ private:
+  /// Bytes of voxels below which no ellipsoids are tried for a PSNR, because little could be saved.
+  static constexpr std::uint64_t kSmallForPsnr = 512;
+
+  [[nodiscard]] Conversion asVoxels(VoxelLayer layer) const {
+    Conversion conversion;
+    conversion.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(layer));
+    return conversion;
+  }
+
+  Job job_;
+};
+
+// ---- What a stored grid promises
+
+/// Encodes and decodes a grid, so that the caller gets the same grid as a reader of the file. A
+/// cancelled conversion keeps the grid that is there.
+/// \param previous  the grid of the previous frame; null: the grid stands alone
+StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
+                            const VoxelMemory& memory) {
+  EsvrFile file, before;
+  file.grids.push_back(std::move(grid));
+  if (previous) before.grids.push_back(*previous);
+  const EsvrFile* const frame = previous ? &before : nullptr;
+  auto read = unlessCancelled([&] {
+    const auto bytes = encodeFrame(file, frame);
+    return std::optional(
+        std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front()));
+  });
+  return read ? std::move(*read) : std::move(file.grids.front());
+}
+
+/// Checks the decoded grid against the bound.
+void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
+  const double error = largestDifference(input.source, decoded);
+  if (error > bound)
+    throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " +
+                         std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
+}
+
+/// Checks the decoded grid against all that it promises.
+void requirePromises(const Job& job, const StoredGrid& grid) {
+  const SparseVolume& source = job.input.source;
+  const auto bound = boundOf(job.options.goal, source);
+  if (!bound && !job.options.fit.narrowBand) return;
+  const BestSoFar completion;  // no grid is returned that was not checked
+  const SparseVolume decoded = decodeGrid(grid, {.memory = memoryOf(source)});
+  if (bound) requireBound(job.input, decoded, *bound);
+  if (job.options.fit.narrowBand) requireSigns(job.input, decoded);
+}
+
+void requirePossible(const ConvertOptions& options) {
+  const Representation wanted = options.representation;
+  if (wanted == Representation::kVoxels && std::holds_alternative<FitGoal>(options.goal))
+    throw UsageError("voxels need a goal: a PSNR, a size, a bound or lossless storage");
+  if (wanted == Representation::kVoxels && options.storage.form == Storage::kFloat32)
+    throw UsageError("float32 storage is a form of ellipsoids; it excludes voxels");
+  const bool wantsEllipsoids =
+      wanted == Representation::kEllipsoids || options.storage.form == Storage::kFloat32;
+  if (wantsEllipsoids && std::holds_alternative<BoundGoal>(options.goal))
+    throw UsageError(
+        "ellipsoids do not bound the error of every voxel; store voxels, or choose a PSNR or a "
+        "size");
+  if (wanted == Representation::kEllipsoids && std::holds_alternative<LosslessGoal>(options.goal))
+    throw UsageError("ellipsoids are not lossless");
+}
+
+/// Intensities may be larger than the values, and the partial sums of many overlapping ellipsoids larger
+/// still. Values up to this difference from the background leave a factor of 256 to the largest number
+/// of float32.
+constexpr float kLargestSummable = 0x1p120f;
+
+/// A voxel whose value differs too much from the background for sums in float32, or nothing.
+std::optional<Coord> tooLargeForSums(const SparseVolume& volume) {
+  const auto isTooLarge = [background = volume.background](float value) {
+    return std::abs(double(value) - background) > kLargestSummable;
+  };
+  const auto found = std::find_if(volume.values.begin(), volume.values.end(), isTooLarge);
+  if (found == volume.values.end()) return std::nullopt;
+  const auto place = std::size_t(found - volume.values.begin());
+  return volume.brickCorner(place / kBrickVoxels) + voxelLocal(int(place % kBrickVoxels));
+}
+
+[[noreturn]] void refuseSums(const ConvertInput& input, Coord tooLarge) {
+  throw BadInput("grid '" + shownName(input.descriptor.name) + "': the value at " +
+                 toString(tooLarge) +
+                 " is too large for a sum of ellipsoids in float32; store voxels, with a PSNR, a "
+                 "size, a bound or lossless");
+}
+
+/// The representation of a grid: voxels, if its values are too large for sums.
+Representation possibleRepresentation(const ConvertInput& input, const ConvertOptions& options) {
+  const auto tooLarge = tooLargeForSums(input.source);
+  if (!tooLarge || std::holds_alternative<LosslessGoal>(options.goal))
+    return options.representation;
+  if (options.representation == Representation::kEllipsoids ||
+      options.storage.form == Storage::kFloat32 || std::holds_alternative<FitGoal>(options.goal))
+    refuseSums(input, *tooLarge);
+  return Representation::kVoxels;
+}
+
+/// The estimated bytes of exact voxels, if an option insisted on ellipsoids and these take more.
+std::optional<std::uint64_t> smallerExactBytes(const Job& job, const StoredGrid& grid) {
+  const bool insists = representationOf(job) == Representation::kEllipsoids;
+  if (!insists || grid.voxels) return std::nullopt;
+  const auto exact = estimateExactVoxels(job).bytes;
+  return exact < bytesAdded(grid) ? std::optional(exact) : std::nullopt;
+}
+
+/// True if a grid should hold voxels because its predecessor does. The difference from it takes few
+/// bytes, so that no fit is made for comparison.
+bool keepsVoxels(const ConvertOptions& options) {
+  const bool hasQuality = std::holds_alternative<PresetGoal>(options.goal) ||
+                          std::holds_alternative<PsnrGoal>(options.goal);
+  return options.previous && options.previous->voxels && hasQuality &&
+         options.representation == Representation::kAuto &&
+         options.storage.form == Storage::kCompact;
+}
+
+/// The mean of the active values, within their range.
+float meanOf(const SparseVolume& volume, const ValueRange& range) {
+  double sum = 0.0, count = 0.0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto values = volume.brickValues(b);
+    double ofBrick = 0.0;
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v)) ofBrick += values[std::size_t(v)];
+    sum += ofBrick, count += volume.active[b].count();
+  }
+  return std::clamp(float(sum / count), range.min, range.max);
+}
+
+/// True if all inactive voxels have the background.
+bool isUniformOutside(const SparseVolume& volume) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v) && volume.brickValues(b)[std::size_t(v)] != volume.background)
+        return false;
+  return true;
+}
+
+/// The background to which the values of a volume are stored if its own is far from them: that of
+/// the previous frame if it is among them, or else their mean. Nothing if its own will do.
+std::optional<float> nearBackground(const ConvertInput& input, const ConvertOptions& options) {
+  const SparseVolume& source = input.source;
+  if (std::holds_alternative<LosslessGoal>(options.goal)) return std::nullopt;
+  const ValueRange range = activeRange(source);
+  if (!spanOf(range, source.background).farBackground || !isUniformOutside(source) ||
+      isNarrowBand(input.descriptor, source))
+    return std::nullopt;
+  if (const StoredGrid* previous = options.previous; previous && previous->farBackground) {
+    const float before = previous->field.background;
+    if (range.min <= before && before <= range.max) return before;
+  }
+  return meanOf(source, range);
+}
+
+/// Converts a volume whose background is far from its values relative to a background among them.
+/// The step from one to the other at the border of the active voxels would otherwise take all
+/// ellipsoids, and sums in float32 would lose the differences of the values. The exact mask is stored,
+/// since a voxel with the wrong state would have a wrong value altogether.
+Conversion convertNear(const ConvertInput& given, const ConvertOptions& options, float background) {
+  GridDescriptor descriptor = given.descriptor;
+  descriptor.background = background;
+  SparseVolume source = given.source;
+  setBackground(background, source);
+  ConvertOptions own = options;
+  own.storage.activity = Activity::kExact;
+  StoredGrid before;  // the previous frame, as it is without its far background
+  if (own.previous && own.previous->farBackground && own.previous->field.background == background) {
+    before = *own.previous;
+    before.descriptor.background = background;
+    before.farBackground = false;
+    own.previous = &before;
+  } else {
+    own.previous = nullptr;
+  }
+  Conversion conversion = convertVolume({descriptor, source}, own);
+  conversion.grid.descriptor = given.descriptor;
+  conversion.grid.farBackground = true;
+  return conversion;
+}
+
+// ---- Conversions
+
+Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
+  requirePossible(options);
+  const CancelScope scope(CancelScope::orToken(options.fit.cancel));
+  CancelScope::check();
+  if (const auto background = nearBackground(input, options))
+    return convertNear(input, options, *background);
+  ConvertOptions own = options;
+  if (own.previous && own.previous->farBackground) own.previous = nullptr;
+  own.fit.cancel = CancelScope::token();
+  own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
+  if (keepsVoxels(own)) own.representation = Representation::kVoxels;
+  own.representation = possibleRepresentation(input, own);
+  const auto convertTo = [](const Job& job) {
+    return std::visit(Converter(job), job.options.goal);
+  };
+  const Job job{input, own};
+  Conversion conversion = own.fit.narrowBand ? convertNarrowBand(job, convertTo) : convertTo(job);
+  conversion.smallerExactBytes =
+      unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
+  conversion.grid =
+      throughTheFormat(std::move(conversion.grid), own.previous, memoryOf(input.source));
+  requirePromises(job, conversion.grid);
+  return conversion;
+}
+
+PaperConversion convertedByPaper(const ConvertInput& input, const PaperFitOptions& options,
+                                 const StorageOptions& storage) {
+  if (options.method.learnK && storage.form == Storage::kCompact)
+    throw UsageError(
+        "a k for each ellipsoid needs float32 storage; compact storage has one edge for all");
+  if (isNarrowBand(input.descriptor, input.source))
+    throw UsageError(
+        "grid '" + shownName(input.descriptor.name) +
+        "' is a level set; the paper's method cannot fit it, because its loss compares windows "
+        "that a narrow band does not fill");
+  if (const auto tooLarge = tooLargeForSums(input.source)) refuseSums(input, *tooLarge);
+  const CancelScope scope(CancelScope::orToken(options.cancel));
+  PaperFitResult made = fitByPaper(input.source, options);
+  ConvertOptions own;
+  static_cast<CommonFitOptions&>(own.fit) = options;
+  own.storage = storage;
+  const Job job{input, own};
+  StoredGrid grid = storedGridOf(job, made.fit);
+  grid.curve = withoutTimes(made.fit.curve);
+  Conversion conversion = storedAs(job, std::move(made.fit), std::move(grid),
+                                   {.loss = CompactOptions{}.loss, .psnr = options.psnr});
+  conversion.grid = throughTheFormat(std::move(conversion.grid), nullptr, memoryOf(input.source));
+  return {std::move(conversion), std::move(made.record)};
+}
+
+}  // namespace
+}  // namespace esvr::encode
+
+namespace esvr {
+
+double presetPsnr(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return 32.0;
+    case Preset::kHigh:
+      return 50.0;
+    case Preset::kStandard:
+      break;
+  }
+  return 40.0;
+}
+
+Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
+  return encode::converted(input, options);
+}
+
+PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions& options,
+                               const StorageOptions& storage) {
+  return encode::convertedByPaper(input, options, storage);
+}
+
+}  // namespace esvr

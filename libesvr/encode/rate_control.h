@@ -1,0 +1,94 @@
+#pragma once
+/// Rate control of ellipsoids: the steps of the four parameter streams with which a fitted grid takes the fewest bytes for
+/// an error, or has the smallest error for its bytes. compactGrid() (esvr/encode.h) is what the rest of the encoder calls.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "esvr/container.h"
+#include "esvr/device.h"
+#include "esvr/quantised.h"
+#include "esvr/volume.h"
+#include "fit/intensity_problem.h"
+
+namespace esvr::encode {
+
+/// A grid whose ellipsoids were quantised with given steps.
+struct RateTrial {
+  QuantiserSteps steps;
+  Field field;  ///< dequantised field, which a reader gets
+  std::vector<QuantisedEllipsoids> quantised;
+  double error = 0.0;       ///< sum of squared errors over the box
+  std::uint64_t bytes = 0;  ///< bytes of the ellipsoids' sections
+};
+
+/// The reference of the measurements, the box that counts and the device that computes.
+struct RateTarget {
+  const SparseVolume& source;
+  Box box;
+  Device device;
+  std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(source)
+  /// Trials are rounded and counted only: the intensities are not solved for, and the error of a trial is that of the
+  /// float32 field. \ref RateTrials::measure gives the true one.
+  bool quick = false;
+};
+
+/// Quantises one grid with one set of steps after the other.
+class RateTrials {
+ public:
+  /// The source must outlive the object. \throws DeviceError  the GPU cannot be used
+  RateTrials(const StoredGrid& grid, const RateTarget& target);
+  RateTrials(const RateTrials&) = delete;
+  RateTrials& operator=(const RateTrials&) = delete;
+
+  /// The sum of squares over the box that corresponds to a PSNR in dB.
+  [[nodiscard]] double squaresOf(double psnr) const;
+
+  /// A sum of squares that is always allowed. It takes the place of a relative loss if the fit is exact or nearly exact.
+  [[nodiscard]] double negligibleError() const;
+
+  /// Error of the float32 field.
+  [[nodiscard]] double error() const { return error_; }
+  /// Error of the float32 field with optimal intensities, which is the limit of fine steps.
+  [[nodiscard]] double leastError() const { return leastError_; }
+  [[nodiscard]] std::size_t count() const { return field_.ellipsoidCount(); }
+
+  /// Rounds the shapes, solves for the intensities with the rounded shapes, and rounds these.
+  [[nodiscard]] RateTrial make(const QuantiserSteps& steps);
+  /// Makes several trials, each with the same result as alone.
+  [[nodiscard]] std::vector<RateTrial> make(std::span<const QuantiserSteps> steps) {
+    return make(steps, problem_);
+  }
+  /// Makes trials for comparison with each other. The intensities are solved and the errors are measured on a sample of
+  /// the bricks only; the bytes are those of all ellipsoids.
+  [[nodiscard]] std::vector<RateTrial> sample(std::span<const QuantiserSteps> steps);
+
+  /// The error of a trial, measured.
+  [[nodiscard]] double measure(const RateTrial& trial);
+
+  /// The error of the first k layers for each k; the last row is the trial itself. Empty if there is only one layer.
+  [[nodiscard]] std::vector<LayerError> layerErrors(const RateTrial& trial);
+
+ private:
+  void solveField();
+  void quantiseChunks(RateTrial& trial) const;
+  [[nodiscard]] StoredError errorOf(const Field& field, std::span<const float> intensities);
+  [[nodiscard]] std::vector<RateTrial> make(std::span<const QuantiserSteps> steps,
+                                            IntensityProblem& problem) const;
+
+  // Targets refer to the bricks before them, and problems to their targets.
+  std::vector<Coord> bricks_;
+  IntensityTarget target_;
+  std::vector<Coord> sampleBricks_;
+  IntensityTarget sampleTarget_;
+  IntensityProblem problem_, sampleProblem_;
+  Field field_;  ///< float32 field with optimal intensities, from which the trials' solver starts
+  std::vector<std::vector<double>> curvature_;  ///< sum of phi^2 of each ellipsoid, by chunk
+  bool quick_;
+  double peak_, error_ = 0.0, leastError_ = 0.0;
+};
+
+}  // namespace esvr::encode

@@ -1,0 +1,88 @@
+#pragma once
+/// The tuned constants of the encoder, in one place. They decide how long a search takes and which
+/// candidates it makes; the bytes, the PSNR and the bounds of what is stored are always measured.
+/// "Lab" refers to docs/lab-notes.md.
+
+#include <cstddef>
+#include <cstdint>
+
+namespace esvr::encode {
+
+struct Tuning {
+  // ---- How ellipsoids grow with their number
+
+  /// Active voxels per ellipsoid of the first guess for a PSNR, and at the largest number of
+  /// ellipsoids that a preset may take. With more of them, voxels take fewer bytes.
+  double voxelsOfFirstGuess = 35.0, leastVoxelsEach = 8.0;
+  /// Bytes that an ellipsoid takes usually and at least, and the price in a short fit relative to
+  /// that in a whole one (smoke1, dragon, aneurism: 6.8 to 9.1 bytes, 0.92 to 0.97).
+  double usualBytesEach = 7.5, leastBytesEach = 4.5, shortFitPrice = 0.94;
+  /// PSNR of a whole fit less that of a short one, dB: smoke1 and wdas have 1.3 to 1.6. Where many
+  /// voxels saturate it is 5 to 6 (dragon, aneurism), since a clamped voxel has no gradient.
+  double shortFitBehind = 1.6, shortFitBehindSaturated = 5.0;
+  /// Share of the active voxels with an extreme value from which on a volume saturates.
+  double saturatedShare = 0.05;
+  /// dB by which a whole fit may exceed its forecast (dragon, neuron_rp140212), and the steepest
+  /// growth of the PSNR by twice the ellipsoids (aneurism has 6.7 dB).
+  double uncertainty = 1.0, steepestDbPerDoubling = 7.0;
+  /// dB by which a fit with both signs must be better to be taken (Lab, "Signs").
+  double signsGain = 0.25;
+
+  // ---- How long fits are
+
+  /// A short fit has a quarter of the iterations of a whole one, within these limits. At 100
+  /// iterations, fit/tuning.h makes the most of them.
+  std::uint32_t leastShortIterations = 30, mostShortIterations = 100;
+  /// Share of a whole fit's iterations that a fit has which continues a short one, and which continues a
+  /// whole one (Lab, "Continued fits").
+  double continuedShare = 0.4, continuedWholeShare = 0.15;
+  /// The same of a fit from seeds for a size, unless many voxels saturate.
+  double sizedShare = 0.6;
+  /// Bricks up to which a whole fit on the CPU has all iterations of its preset; larger volumes have
+  /// fewer in proportion. An iteration takes 5 to 13 us of two cores for each brick of smoke1,
+  /// aneurism and neuron_m207, so that a whole fit takes 10 to 27 seconds.
+  double bricksOfWholeFit = 2100.0;
+  /// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the
+  /// bytes of a short one, which for fewer bytes is worth less time in proportion (hydrogen_atom: 560
+  /// bytes in 12 CPU seconds with all iterations).
+  double bytesOfWholeFit = 4096.0;
+
+  // ---- Ellipsoids or more bits
+
+  /// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
+  /// more bits, and above which fewer ellipsoids are better (Lab, "More ellipsoids or more bits").
+  double usualLoss = 0.9, mostLoss = 2.5;
+
+  // ---- Voxels
+
+  /// Price of a bit (ThriftOptions): 0.05 gives files that are up to 1 % larger at 40 to 60 dB, 0.12
+  /// up to 5 % (Lab, "Voxel coding"). For voxels that are predicted from another grid or from the
+  /// frame before, those whose bits are not worth their price keep to the prediction; in a frame this
+  /// also means less flicker.
+  double price = 0.08, predictedPrice = 0.14, framePrice = 0.2;
+  /// Share of the errors of the frame before that voxels keep. On a fire and a gas, 0 takes fewer
+  /// bytes and flickers; a half and more takes many bytes for little less flicker.
+  double errorsKept = 0.25;
+  /// Share of the active voxels with one value from which on a lattice that contains it is tried.
+  double plateauShare = 0.02;
+  /// Bricks of the sample on which voxels of large volumes are tried, in runs of 64
+  /// neighbours.
+  std::size_t sampleBricks = 2048;
+
+  // ---- Choosing
+
+  /// Factor by which an estimate of the bytes of voxels may be wrong. Within it, voxels are coded.
+  double estimateMargin = 1.2;
+  /// Exact voxels are stored if they take at most this factor of the bytes of the best other grid
+  /// for a PSNR, or these bytes more.
+  double exactFactor = 1.03;
+  std::uint64_t exactBytes = 64;
+  /// Share of the bytes of voxels that ellipsoids must be expected to stay below to be fitted for a
+  /// preset, and bytes of voxels below which no ellipsoids are tried: a fit takes longer than coding.
+  double worthwhileShare = 0.85;
+  std::uint64_t smallEnough = 1024;
+};
+
+inline constexpr Tuning kTuning{};
+
+}  // namespace esvr::encode

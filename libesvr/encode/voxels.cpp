@@ -1,0 +1,540 @@
+#include "encode/voxels.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "codec/brick_coder.h"
+#include "core/add_seconds.h"
+#include "core/parallel.h"
+#include "encode/root_search.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+#include "format/section_table.h"
+#include "format/voxel_section.h"
+
+namespace esvr::encode {
+
+// ---- Properties of a job's voxels
+
+Activity voxelActivity(const Job& job) {
+  const bool levelSet = job.input.descriptor.gridClass == GridClass::kLevelSet;
+  return levelSet ? Activity::kExact : job.options.storage.activity;
+}
+
+RoundedSigns voxelSigns(const Job& job) {
+  return job.options.fit.narrowBand ? RoundedSigns::kKept : RoundedSigns::kMayChange;
+}
+
+DecodedValues decodedValues(const Job& job) {
+  return job.input.descriptor.valueType == ValueType::kHalf ? DecodedValues::kHalfs
+                                                            : DecodedValues::kFloats;
+}
+
+// ---- The sample
+
+SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
+  constexpr std::size_t kBricksOfRun = 64;
+  if (volume.brickCount() <= bricks) return volume;
+  const std::size_t runs = std::max<std::size_t>(bricks / kBricksOfRun, 1);
+  const auto order = codec::codingOrder(volume.bricks);
+  const std::size_t length = bricks / runs, last = order.size() - length;
+  std::vector<std::size_t> chosen;
+  for (std::size_t run = 0; run < runs; ++run) {
+    const auto first = std::ptrdiff_t(runs > 1 ? run * last / (runs - 1) : last / 2);
+    chosen.insert(chosen.end(), order.begin() + first,
+                  order.begin() + first + std::ptrdiff_t(length));
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  SparseVolume sample;
+  sample.origin = volume.origin;
+  sample.background = volume.background;
+  for (const std::size_t b : chosen) {
+    const auto values = volume.brickValues(b);
+    sample.bricks.push_back(volume.bricks[b]);
+    sample.active.push_back(volume.active[b]);
+    sample.values.insert(sample.values.end(), values.begin(), values.end());
+  }
+  return sample;
+}
+
+namespace {
+
+/// A volume is sampled from this many times the bricks of a sample. A smaller one is tried as a whole,
+/// so that it is coded once.
+constexpr std::size_t kSampledFrom = 4;
+
+SparseVolume sampleFor(const Job& job, std::size_t bricks) {
+  const SparseVolume& source = job.input.source;
+  const bool isLarge = source.brickCount() >= kSampledFrom * bricks;
+  // A frame is predicted from all bricks of the frame before.
+  if (!isLarge || job.options.previous) return {};
+  return sampleOf(source, bricks);
+}
+
+Plateau plateauOf(const SparseVolume& volume) {
+  std::vector<float> values;
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    if (volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels)))
+      values.push_back(volume.values[i]);
+  tbb::parallel_sort(values.begin(), values.end());
+  Plateau plateau;
+  for (auto from = values.begin(); from != values.end();) {
+    const auto to = std::upper_bound(from, values.end(), *from);
+    const double share = double(to - from) / double(values.size());
+    if (*from != 0.0f && *from != volume.background && share > plateau.share)
+      plateau = {std::abs(double(*from)), share};
+    from = to;
+  }
+  return plateau;
+}
+
+/// About the bits that the voxels of a volume take within a bound: the logarithm of the differences of
+/// neighbours in steps. Bricks differ much, so that the bytes of a sample are scaled by this number and
+/// not by that of the bricks.
+double complexityOf(const SparseVolume& volume, double bound) {
+  constexpr double kLeast = 0.02;  // bits of a voxel that is predicted exactly
+  std::vector<double> bits(volume.brickCount());
+  parallelFor(std::size_t{0}, bits.size(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    float sum = 0.0f;
+    for (std::size_t v = 1; v < kBrickVoxels; ++v)
+      sum += std::log2(1.0f + float(std::abs(double(values[v]) - values[v - 1]) / (2.0 * bound)));
+    bits[b] = double(sum) + kLeast * kBrickVoxels;
+  });
+  return std::accumulate(bits.begin(), bits.end(), 0.0);
+}
+
+/// Bytes of a layer's section without its palette, which a sample has as a whole.
+double bytesOfCodes(const VoxelLayer& layer) {
+  return double(format::putVoxels(layer).size()) - double(layer.palette.size() * sizeof(float));
+}
+
+/// Bytes that a grid of voxels adds to a file besides those of its voxels, with padding.
+std::uint64_t bytesBeside(const Job& job) {
+  const std::uint64_t empty = format::putVoxels({}).size();
+  return bytesAdded(makeStoredVoxels(job.input.descriptor, job.input.source, {})) - empty +
+         format::kAlignment;
+}
+
+/// The bytes of exact voxels of a volume, from those of a sample.
+std::uint64_t exactBytesOf(const SparseVolume& sample, const SparseVolume& whole) {
+  const VoxelLayer layer = exactLayer(sample);
+  const double bound = spanOf(whole).length() * 0x1p-14;
+  const bool isWhole = sample.brickCount() == whole.brickCount() || !(bound > 0.0);
+  const double share = isWhole ? double(sample.brickCount()) / double(whole.brickCount())
+                               : complexityOf(sample, bound) / complexityOf(whole, bound);
+  return std::uint64_t(bytesOfCodes(layer) / share) + layer.palette.size() * sizeof(float);
+}
+
+/// Bits of an active voxel from which on exact voxels may be as small, by the form of these: a palette
+/// takes any number of bits, and the last bits of half floats and floats are noise.
+double leastBitsOfExact(VoxelForm form) {
+  return form == VoxelForm::kPalette ? 0.0 : form == VoxelForm::kHalf ? 5.0 : 12.0;
+}
+
+// Bounds are counted in octaves below the span of the values: 1 is half the span.
+constexpr double kCoarsest = 1.0, kFinest = 24.0;  // float32 has 24 bits
+constexpr double kNarrowest = 0.002;               // a bound that differs by 0.14 % is not tried
+constexpr double kDbPerOctave = 6.02;              // gain of PSNR by half the bound
+constexpr double kDoublingsPerOctave = 0.5;        // usual growth of the bytes by half the bound
+constexpr double kThriftOctaves = 0.08;            // make up for the loss by a price
+
+// Trials of a search. Each nearest one takes a pass over the voxels, and each thrifty one as long as
+// coding them.
+constexpr int kNearestTrials = 14, kThriftyTrials = 6, kFrameTrials = 8, kSizeTrials = 8,
+              kPlateauTrials = 4;
+/// dB above a PSNR that end a search on the sample, and on the whole volume.
+constexpr double kPsnrTolerance = 0.05, kFinalTolerance = 0.08;
+/// Share of a size that may stay unused.
+constexpr double kSizeTolerance = 0.01;
+/// Factor by which codes may exceed a size before a trial ends. While codes are chosen, the coder's
+/// parameters are those of the nearest codes, which can take a few more bytes.
+constexpr double kCodesBeyondSize = 1.1;
+/// Where the bound cannot be chosen freely, higher prices use up the PSNR that is left.
+constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
+
+RootRange octaves() { return {kCoarsest, kFinest, kNarrowest}; }
+
+}  // namespace
+
+Candidate estimateExactVoxels(const Job& job) {
+  const SparseVolume& source = job.input.source;
+  std::uint64_t bytes = 0;
+  bool isSampled = false;
+  const double seconds = secondsOf([&] {
+    const SparseVolume sample = sampleFor(job, kTuning.sampleBricks);
+    isSampled = sample.brickCount() > 0;
+    bytes = exactBytesOf(isSampled ? sample : source, source) + bytesBeside(job);
+  });
+  return {bytes, std::numeric_limits<double>::infinity(), isSampled, seconds};
+}
+
+VoxelCandidate exactVoxels(const Job& job) {
+  VoxelCandidate made;
+  made.seconds = secondsOf([&] {
+    const auto& [descriptor, source] = job.input;
+    made.grid = makeStoredVoxels(descriptor, source, exactLayer(source));
+    made.bytes = bytesInFrame(made.grid, job.options.previous);
+    made.psnr = std::numeric_limits<double>::infinity();
+  });
+  return made;
+}
+
+// ---- Settings
+
+VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
+    : job_(job),
+      goal_(goal),
+      box_(job.options.fit.box.value_or(activeBox(job.input.source))),
+      peak_(job.options.fit.peak ? *job.options.fit.peak : peakOf(job.input.source)),
+      sample_(sampleFor(job, goal.sampleBricks)),
+      tryOn_(sample_.brickCount() > 0 ? sample_ : job.input.source),
+      share_(double(tryOn_.brickCount()) / double(job.input.source.brickCount())),
+      range_(spanOf(job.input.source).length()),
+      besides_(bytesBeside(job)) {
+  decision_.seconds = secondsOf([&] { plateau_ = plateauOf(tryOn_); });
+  seconds_ += *decision_.seconds;
+}
+
+double VoxelSearch::price() const {
+  if (!job_.options.previous) return kTuning.price;
+  return job_.options.keepsPastErrors ? kTuning.framePrice : kTuning.predictedPrice;
+}
+
+double VoxelSearch::boundOf(const Setting& setting) const {
+  if (setting.levels > 0.0) return 0.5 * plateau_.value / setting.levels;
+  return range_ * std::exp2(-setting.octave);
+}
+
+/// \param tooMany  set to the expected bytes of the codes if these clearly exceed the size, so that
+///                 the work stopped and the layer is of no use; null: the work never stops
+VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setting,
+                                std::uint64_t* tooMany) const {
+  VoxelLayer layer = boundedLayer(volume, boundOf(setting), voxelActivity(job_), voxelSigns(job_));
+  if (setting.price == 0.0) return layer;
+  const StoredGrid* previous = job_.options.previous;
+  ThriftOptions thrift{setting.price, previous && previous->voxels ? &*previous->voxels : nullptr,
+                       job_.options.keepsPastErrors ? kTuning.errorsKept : 0.0, voxelSigns(job_)};
+  if (tooMany) {
+    const double left = double(*goal_.bytes - std::min(*goal_.bytes, besides_));
+    thrift.mostBytes =
+        std::uint64_t(kCodesBeyondSize * left * shareOfBytes(volume, boundOf(setting)));
+  }
+  ThriftyLayer thrifty = thriftyLayer(volume, std::move(layer), thrift);
+  if (tooMany && thrifty.tooMany) *tooMany = *thrifty.tooMany;
+  return std::move(thrifty.layer);
+}
+
+double VoxelSearch::shareOf(const SparseVolume& volume) const {
+  return &volume == &tryOn_ ? share_ : 1.0;
+}
+
+double VoxelSearch::psnrOn(const SparseVolume& volume, const VoxelLayer& layer) const {
+  SparseVolume made = volumeOf(layer);
+  if (decodedValues(job_) == DecodedValues::kHalfs) roundToHalfs(made);
+  return psnrOverBox(volume, made, {.box = box_, .peak = peak_}) +
+         10.0 * std::log10(shareOf(volume));
+}
+
+VoxelSearch::Tried VoxelSearch::tried(const SparseVolume& volume, const Setting& setting) const {
+  Tried made{setting, layerOf(volume, setting)};
+  made.psnr = psnrOn(volume, made.layer);
+  return made;
+}
+
+/// The share of the bytes of the whole volume that a sample has at a bound.
+double VoxelSearch::shareOfBytes(const SparseVolume& volume, double bound) const {
+  if (&volume != &tryOn_ || !isSampled()) return 1.0;
+  return complexityOf(volume, bound) / complexityOf(job_.input.source, bound);
+}
+
+std::uint64_t VoxelSearch::bytesOf(const SparseVolume& volume, const VoxelLayer& layer,
+                                   double bound) const {
+  if (job_.options.previous)
+    return bytesInFrame(makeStoredVoxels(job_.input.descriptor, job_.input.source, layer),
+                        job_.options.previous);
+  return std::uint64_t(bytesOfCodes(layer) / shareOfBytes(volume, bound)) +
+         layer.palette.size() * sizeof(float) + besides_;
+}
+
+/// The coarsest trial found that reaches a PSNR; nothing if none does.
+std::optional<VoxelSearch::Tried> VoxelSearch::coarsest(const SparseVolume& volume, double psnr,
+                                                        const Setting& first, int mostTrials,
+                                                        double tolerance) const {
+  RootSearch search(octaves(), psnr + 0.3 * tolerance, kDbPerOctave, first.octave);
+  std::optional<Tried> best;
+  for (int n = 0; n < mostTrials && !search.ended(); ++n) {
+    auto now = unlessCancelled([&]() -> std::optional<Tried> {
+      return tried(volume, {search.next(), first.price});
+    });
+    if (!now && best) break;
+    if (!now) throw Cancelled();
+    search.learn(now->psnr);
+    const bool isCoarser = !best || now->setting.octave < best->setting.octave;
+    if (now->psnr >= psnr && isCoarser) best = std::move(now);
+    if (best && best->psnr < psnr + tolerance) break;
+  }
+  return best;
+}
+
+// ---- A PSNR
+
+/// The smallest voxels found whose lattice has the value of the plateau. The number of its levels is
+/// found by bisection, although the PSNR need not be monotone in it where there are other plateaus.
+std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr, const Tried& plain) const {
+  const auto reaches = [&](double levels) {
+    return tried(tryOn_, {.levels = levels}).psnr >= psnr;
+  };
+  double enough = std::max(std::round(0.5 * plateau_.value / boundOf(plain.setting)), 1.0) + 1.0;
+  if (!reaches(enough)) return std::nullopt;
+  double tooFew = std::max(std::floor(0.5 * enough) - 1.0, 0.0);
+  while (enough - tooFew > 1.0) {
+    const double middle = std::floor(0.5 * (tooFew + enough));
+    (reaches(middle) ? enough : tooFew) = middle;
+  }
+  std::optional<Tried> best;  // a higher price takes fewer bytes
+  for (const double price : kPlateauPrices) {
+    Tried trial = tried(tryOn_, {.price = price, .levels = enough});
+    if (trial.psnr < psnr) break;
+    best = std::move(trial);
+  }
+  if (best) best->bytes = bytesOf(tryOn_, best->layer, boundOf(best->setting));
+  return best;
+}
+
+void VoxelSearch::tryForPsnr() {
+  const double psnr = *goal_.psnr;
+  const Setting first{psnr / kDbPerOctave - 1.0};
+  auto plain =
+      range_ > 0.0 ? coarsest(tryOn_, psnr, first, kNearestTrials, kPsnrTolerance) : std::nullopt;
+  if (plain) {
+    best_ = std::move(plain);
+    const Setting thrifty{
+        best_->setting.octave + (job_.options.previous ? price() : kThriftOctaves), price()};
+    const int trials = job_.options.previous ? kFrameTrials : kThriftyTrials;
+    std::optional<Tried> cheaper, with;
+    parallelInvoke(
+        [&] {
+          cheaper = coarsest(tryOn_, psnr, thrifty, trials, kPsnrTolerance);
+          Tried& smaller = cheaper ? *cheaper : *best_;
+          smaller.bytes = bytesOf(tryOn_, smaller.layer, boundOf(smaller.setting));
+        },
+        [&] {
+          if (!hasPlateau() || job_.options.previous) return;
+          const double seconds = secondsOf([&] { with = fewestLevels(psnr, *best_); });
+          *decision_.seconds += seconds;
+          decision_.tried = true;
+        });
+    if (cheaper) best_ = std::move(cheaper);
+    decidePlateau(std::move(with));
+  }
+  const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
+  const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
+  if (bits >= leastBitsOfExact(exactLayer(tryOn_).form))
+    exact_ = job_.options.previous ? exactVoxels(job_).bytes
+                                   : exactBytesOf(tryOn_, job_.input.source) + besides_;
+}
+
+/// Takes the lattice with the plateau where it is better, and records the decision.
+void VoxelSearch::decidePlateau(std::optional<Tried> with) {
+  if (!decision_.tried) return;
+  if (best_) decision_.bytesWithout = best_->bytes;
+  if (with) decision_.bytesWith = with->bytes;
+  const auto better = [&](const Tried& a, const Tried& b) {
+    return goal_.psnr ? a.bytes < b.bytes : a.psnr > b.psnr;
+  };
+  decision_.used = with && (!best_ || better(*with, *best_));
+  if (decision_.used) best_ = std::move(with);
+}
+
+// ---- A size
+
+/// Thrifty voxels of a setting; with bytes above the size if they are clearly too large, and without
+/// layer and PSNR then.
+std::optional<VoxelSearch::Tried> VoxelSearch::sized(const SparseVolume& volume,
+                                                     const Setting& setting) const {
+  std::uint64_t tooMany = 0;
+  Tried made{setting, layerOf(volume, setting, &tooMany)};
+  if (tooMany > 0) {
+    made.bytes =
+        std::max(std::uint64_t(double(tooMany) / shareOfBytes(volume, boundOf(setting))) + besides_,
+                 *goal_.bytes + 1);
+    made.layer = {};
+    return made;
+  }
+  made.bytes = bytesOf(volume, made.layer, boundOf(setting));
+  if (made.bytes <= *goal_.bytes) made.psnr = psnrOn(volume, made.layer);
+  return made;
+}
+
+/// The best voxels found that keep to the size. With plateaus, the largest are not always the best.
+std::optional<VoxelSearch::Tried> VoxelSearch::fullest(const SparseVolume& volume,
+                                                       const Setting& first) const {
+  const double bytes = double(*goal_.bytes);
+  RootSearch search(octaves(), std::log2((1.0 - 0.3 * kSizeTolerance) * bytes), kDoublingsPerOctave,
+                    first.octave);
+  std::optional<Tried> best;
+  for (int n = 0; n < kSizeTrials && !search.ended(); ++n) {
+    Setting setting{search.next(), first.price};
+    if (first.levels > 0.0)
+      setting.levels = std::max(std::round(0.5 * plateau_.value / boundOf(setting)), 1.0);
+    auto now = unlessCancelled([&] { return sized(volume, setting); });
+    if (!now && best) break;
+    if (!now) throw Cancelled();
+    search.learn(std::log2(double(now->bytes)));
+    if (double(now->bytes) > bytes) continue;
+    const bool isFull = double(now->bytes) >= (1.0 - kSizeTolerance) * bytes;
+    if (!best || now->psnr > best->psnr) best = std::move(now);
+    if (isFull) break;
+  }
+  return best;
+}
+
+bool VoxelSearch::mayReach(double psnr) {
+  bool may = true;
+  seconds_ += secondsOf([&] {
+    if (job_.options.previous || !std::isfinite(psnr) || !(range_ > 0.0)) return;
+    auto plain =
+        coarsest(tryOn_, psnr, {psnr / kDbPerOctave - 1.0}, kNearestTrials, kPsnrTolerance);
+    if (!plain) return;
+    const auto made = sized(tryOn_, {plain->setting.octave, price()});
+    const double margin = isSampled() ? kTuning.estimateMargin : 1.0;
+    may = hasPlateau() || double(made->bytes) <= margin * double(*goal_.bytes);
+    if (!may) tooLarge_ = Candidate{made->bytes, plain->psnr, true};
+  });
+  if (tooLarge_) tooLarge_->seconds = seconds_;
+  return may;
+}
+
+void VoxelSearch::tryForSize() {
+  exact_ = exactBytesOf(tryOn_, job_.input.source) + besides_;
+  if (!(range_ > 0.0)) return;
+  const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
+  const Setting first{2.0 + 8.0 * double(*goal_.bytes) / active, price()};
+  best_ = fullest(tryOn_, first);
+  if (!hasPlateau()) return;
+  std::optional<Tried> with;
+  decision_.tried = true;
+  *decision_.seconds += secondsOf([&] {
+    Setting setting = best_ ? best_->setting : first;
+    setting.levels = 1.0;
+    with = best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
+                 : fullest(tryOn_, setting);
+  });
+  decidePlateau(std::move(with));
+}
+
+// ---- The result
+
+void VoxelSearch::trySettings() {
+  if (std::exchange(hasTried_, true)) return;
+  seconds_ += secondsOf([&] {
+    // On the whole volume, the first voxels that meet the goal are worth keeping.
+    const auto end = unlessCancelled([&]() -> std::optional<bool> {
+      goal_.psnr ? tryForPsnr() : tryForSize();
+      return true;
+    });
+    if (!end && (isSampled() || !best_)) throw Cancelled();
+  });
+}
+
+std::optional<Candidate> VoxelSearch::estimate() {
+  trySettings();
+  std::optional<Candidate> found;
+  if (best_)
+    found = Candidate{best_->bytes, goal_.psnr && isSampled() ? *goal_.psnr : best_->psnr,
+                      isSampled(), seconds_};
+  const std::uint64_t most = goal_.bytes ? *goal_.bytes : found ? found->bytes : UINT64_MAX;
+  if (exact_ && *exact_ <= most)
+    found = Candidate{*exact_, std::numeric_limits<double>::infinity(), isSampled(), seconds_};
+  return found;
+}
+
+VoxelCandidate VoxelSearch::candidateOf(Tried tried) const {
+  VoxelCandidate made;
+  made.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(tried.layer));
+  const BestSoFar completion;
+  made.bytes = bytesInFrame(made.grid, job_.options.previous);
+  made.psnr = tried.psnr;
+  return made;
+}
+
+/// The voxels of the whole volume whose lattice has the plateau: about as many levels as on the sample,
+/// and the price that then uses up the PSNR.
+std::optional<VoxelSearch::Tried> VoxelSearch::withPlateau(const SparseVolume& volume,
+                                                           Setting setting) const {
+  std::optional<Tried> best;
+  double tooFew = 0.0;
+  for (int n = 0; n < kPlateauTrials && setting.levels > tooFew; ++n) {
+    Tried now = tried(volume, setting);
+    const double excess = now.psnr - *goal_.psnr;
+    if (excess < 0.0) tooFew = std::max(tooFew, setting.levels);
+    const double wanted = setting.levels * std::pow(10.0, -excess / 20.0);
+    if (excess >= 0.0 && (!best || setting.levels <= best->setting.levels)) best = std::move(now);
+    double next = std::max(std::ceil(wanted), tooFew + 1.0);
+    if (excess > kFinalTolerance) next = std::min(next, setting.levels - 1.0);
+    if (best && next >= best->setting.levels) break;
+    setting.levels = next;
+  }
+  for (const double price : kPlateauPrices) {
+    if (!best || price <= best->setting.price) continue;
+    Tried now = tried(volume, {.price = price, .levels = best->setting.levels});
+    if (now.psnr < *goal_.psnr) break;
+    best = std::move(now);
+  }
+  return best;
+}
+
+/// Quantised voxels of the whole volume with the setting that is best on the sample.
+std::optional<VoxelCandidate> VoxelSearch::finished() {
+  if (!best_) return std::nullopt;
+  if (!isSampled()) return candidateOf(std::move(*best_));
+  const SparseVolume& source = job_.input.source;
+  const Setting setting = best_->setting;
+  if (goal_.bytes) {
+    auto found = fullest(source, setting);
+    return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
+  }
+  if (setting.levels == 0.0) {
+    auto found = coarsest(source, *goal_.psnr, setting, kThriftyTrials, kFinalTolerance);
+    return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
+  }
+  auto found = withPlateau(source, setting);
+  return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
+}
+
+std::optional<VoxelCandidate> VoxelSearch::run() {
+  trySettings();
+  std::optional<VoxelCandidate> found;
+  seconds_ += secondsOf([&] {
+    // Exact voxels of a size are the best ones, so that they are tried first.
+    const double margin = kTuning.estimateMargin;
+    if (goal_.bytes && exact_ && double(*exact_) <= margin * double(*goal_.bytes)) {
+      VoxelCandidate exact = exactVoxels(job_);
+      if (exact.bytes <= *goal_.bytes) found = std::move(exact);
+    }
+    if (!found) found = finished();
+    if (goal_.bytes) return;
+    const double most = found ? std::max(kTuning.exactFactor * double(found->bytes),
+                                         double(found->bytes + kTuning.exactBytes))
+                              : HUGE_VAL;
+    if (found && (!exact_ || double(*exact_) > margin * most)) return;
+    auto exact = unlessCancelled([&] { return std::optional(exactVoxels(job_)); });
+    if (exact && double(exact->bytes) <= most) found = std::move(exact);
+  });
+  if (!found && goal_.psnr) throw Cancelled();
+  if (found && goal_.bytes && found->bytes > *goal_.bytes) found.reset();
+  if (found && decision_.used) decision_.bytesWith = found->bytes;
+  if (found) found->seconds = seconds_, found->plateau = decision_;
+  return found;
+}
+
+}  // namespace esvr::encode

@@ -1,0 +1,296 @@
+#pragma once
+/// The encoder: converts a volume to a stored grid for a goal, quantises fitted ellipsoids, leaves the
+/// less important ones out, corrects signs, and chooses what the grids of a file share. vdb2esvr and
+/// esvr-compare call it for every grid.
+///
+/// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
+/// (three for Preset::kHigh and above the usual effort; for a size up to five, until one keeps to it),
+/// and at most four short ones, which forecast them.
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <variant>
+
+#include "esvr/container.h"
+#include "esvr/device.h"
+#include "esvr/fit.h"
+#include "esvr/grid.h"
+#include "esvr/grid_coding.h"
+#include "esvr/paper_method.h"
+#include "esvr/quantised.h"
+#include "esvr/volume.h"
+
+namespace esvr {
+
+/// A single fit, which ends as FitOptions determine.
+struct FitGoal {};
+
+/// The smallest grid found whose error is at most that of presetPsnr(FitOptions::preset) over the
+/// active voxels. Errors at inactive voxels of the box count too, so that the PSNR over the active
+/// voxels alone is at least as high. FitOptions::count, psnr and seconds are ignored.
+struct PresetGoal {};
+
+/// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
+/// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid.
+/// FitOptions::count, psnr and seconds are ignored.
+struct SizeGoal {
+  std::uint64_t bytes = 0;
+};
+
+/// The smallest grid found whose PSNR over the box is at least `psnr`. FitOptions::count is the
+/// largest number of ellipsoids; FitOptions::psnr and seconds are ignored.
+struct PsnrGoal {
+  double psnr = 0.0;  ///< dB
+};
+
+/// A grid of voxels that restores every voxel within a bound.
+struct BoundGoal {
+  double bound = 0.0;  ///< largest absolute error, 0 or above
+  /// `bound` is a share of valueRangeOf() of the volume (metrics.h). The components of a vector have
+  /// one range, valueRangeOfVectors(), so that their bound should be given in units of the values.
+  bool relative = false;
+};
+
+/// A grid that restores every voxel and the active mask bit for bit. It holds voxels.
+struct LosslessGoal {};
+
+using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
+
+/// PSNR over the active voxels that a preset stands for, dB.
+[[nodiscard]] double presetPsnr(Preset preset);
+
+/// What a stored grid consists of. A BoundGoal and a LosslessGoal always store voxels.
+enum class Representation {
+  /// Ellipsoids or voxels: those with the higher PSNR for a SizeGoal, and those that take fewer
+  /// bytes for a PsnrGoal and a PresetGoal; exact voxels where they take hardly more. A FitGoal
+  /// stores ellipsoids unless exact voxels take no more bytes. Which of the two is better is usually
+  /// known from a sample of the voxels and from a short fit, so that only one of them is completed.
+  kAuto,
+  /// Ellipsoids. Those of a narrow band have a residual where the sign of a voxel would be wrong.
+  kEllipsoids,
+  kVoxels
+};
+
+/// The form of ellipsoids in a file. kFloat32 is never replaced by voxels.
+enum class Storage {
+  kCompact,  ///< quantised and entropy-coded: 7 to 12 bytes per ellipsoid
+  kFloat32   ///< float32 parameters: about 34 bytes per ellipsoid
+};
+
+struct StorageOptions {
+  Storage form = Storage::kCompact;
+  /// How active voxels are stored. Level sets that are stored as voxels always take kExact.
+  Activity activity = Activity::kByValue;
+};
+
+/// The effort of conversions unless options say otherwise, and its limits.
+inline constexpr int kUsualEffort = 5, kLeastEffort = 1, kMostEffort = 9;
+
+struct ConvertOptions {
+  Goal goal;
+  /// How long a conversion may take, from kLeastEffort to kMostEffort. A step below kUsualEffort halves
+  /// the iterations of fits; a step above it makes them half as long again, and allows a third fit.
+  /// On the CPU, the fits of large volumes have fewer iterations, so that with the usual effort a
+  /// conversion of up to 30 million active voxels takes about a minute on two cores. Where too few
+  /// iterations remain, only voxels are stored (Conversion::fitsTookTooLong).
+  int effort = kUsualEffort;
+  Representation representation = Representation::kAuto;
+  FitOptions fit;  ///< narrowBand is set by the conversion
+  StorageOptions storage;
+  /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
+  /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
+  /// Another grid that this one refers to in its file may take its place.
+  /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal and a PsnrGoal, so that
+  /// only the first frame of a group takes the time of a fit.
+  const StoredGrid* previous = nullptr;
+  /// Voxels keep a part of the errors of the previous frame, if there is one. Errors that stay in
+  /// their places flicker less, for a few bytes more. It is false where `previous` is another grid.
+  bool keepsPastErrors = true;
+};
+
+/// A volume and its other properties.
+struct ConvertInput {
+  const GridDescriptor& descriptor;
+  const SparseVolume& source;
+};
+
+/// A hash of all that a conversion depends on besides its options: the volume bit for bit, whether
+/// the grid is a level set, and whether its values were doubles. Inputs with the same key are
+/// converted to grids that differ in their descriptors only, except that a SizeGoal counts the
+/// bytes of the descriptor.
+struct InputKey {
+  std::uint64_t low = 0, high = 0;
+  friend auto operator<=>(const InputKey&, const InputKey&) = default;
+};
+[[nodiscard]] InputKey keyOf(const ConvertInput& input);
+
+/// The outcome of quantising the ellipsoids.
+struct CompactRecord {
+  double loss = 0.0;     ///< loss of PSNR over the box against float32, dB
+  QuantiserSteps steps;  ///< quantisation steps of the four streams
+};
+
+/// A grid that was considered for a goal.
+struct Candidate {
+  std::uint64_t bytes = 0;  ///< bytesAdded
+  /// PSNR over the box, dB; +inf for exact voxels. Nothing if it was not measured.
+  std::optional<double> psnr{};
+  /// The figures were extrapolated from a short fit, from a sample, or from the first bricks of
+  /// voxels that are too large.
+  bool estimated = false;
+  /// Wall-clock seconds that all trials for this candidate took; nothing if none was made.
+  std::optional<double> seconds{};
+};
+
+/// The candidates for a goal that voxels and ellipsoids can both reach.
+struct ChoiceRecord {
+  std::optional<Candidate> voxels;      ///< nothing if they cannot reach the goal or were not tried
+  std::optional<Candidate> ellipsoids;  ///< nothing if they cannot reach the goal or were not tried
+};
+
+/// What a conversion found out about a means of making a grid better or smaller. Figures that were
+/// not measured are missing. If the goal is a size, both grids fill it, and the one with the higher
+/// PSNR is stored.
+struct Decision {
+  bool tried = false;                           ///< grids with it were made to be compared
+  bool used = false;                            ///< the stored grid has it
+  std::optional<std::uint64_t> bytesWith{};     ///< bytesAdded of the best grid with it
+  std::optional<std::uint64_t> bytesWithout{};  ///< bytesAdded of the best grid without it
+  std::optional<double> seconds{};              ///< wall-clock seconds that deciding took
+};
+
+/// The decisions of a conversion besides that between voxels and ellipsoids (ChoiceRecord).
+struct DecisionRecord {
+  /// Intensities of both signs although all values have one sign. The clamp makes this possible: it
+  /// removes what the sum has beyond the range of the values.
+  Decision bothSigns;
+  /// A quantisation lattice of voxels that contains the most frequent value, the plateau.
+  Decision plateau;
+};
+
+struct Conversion {
+  StoredGrid grid;                       ///< the grid that a reader of the file gets
+  FitResult fit;                         ///< its field is empty; unused if voxels are stored
+  std::optional<CompactRecord> compact;  ///< set if ellipsoids are stored as kCompact
+  std::optional<ChoiceRecord> choice;    ///< set if voxels were considered for the goal
+  DecisionRecord decisions;
+  /// True if ellipsoids were not tried because fitting them would take longer than the effort allows.
+  bool fitsTookTooLong = false;
+  /// Bytes of exact voxels, estimated from a sample, if they are fewer than those of the ellipsoids
+  /// on which the representation or the storage insisted.
+  std::optional<std::uint64_t> smallerExactBytes;
+};
+
+/// Converts a volume. The result is as deterministic as that of fit(). If a PSNR is out of reach,
+/// the best fit found is returned with FitEnd::kPsnrMissed.
+/// \throws UsageError  the grid does not fit into the size; the source of a LosslessGoal has
+///                     doubles; a SizeGoal is combined with kFloat32; the goal and the
+///                     representation or the storage exclude each other; a SizeGoal is too small for
+///                     the ellipsoids of a narrow band and the residual of their signs
+/// A volume whose background is far from its values (spanOf, volume.h) is converted relative
+/// to a value among them, with its exact mask whatever StorageOptions::activity says, unless the goal
+/// is lossless (StoredGrid::farBackground).
+/// Values that differ from the background by more than 2^120 (1.3e36) are too large for sums in
+/// float32; such a grid is stored as voxels.
+/// \throws BadInput  values are too large for sums, and the goal or an option needs ellipsoids (the
+///                   text names the grid and the voxel)
+/// \throws RuntimeFailure  the stored grid exceeds its bound; a voxel of a narrow band has another
+///                         sign than in the source (the text names the grid and the voxel)
+/// Other exceptions are those of fit and compactGrid.
+[[nodiscard]] Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options);
+
+struct PaperConversion {
+  Conversion conversion;
+  PaperRecord record;
+};
+
+/// Converts a volume with a fit by the paper's method, for comparison.
+/// \throws UsageError  the volume is a narrow band; k is learned for each ellipsoid, but the
+///                     storage is kCompact
+/// \throws BadInput  values are too large for sums, as for convertVolume
+/// Other exceptions are those of fitByPaper and compactGrid.
+[[nodiscard]] PaperConversion convertByPaper(const ConvertInput& input,
+                                             const PaperFitOptions& options,
+                                             const StorageOptions& storage);
+
+// Chooses the grids of a file whose voxels are the context of other grids' voxels (VoxelReference),
+// so that they take fewer bytes.
+
+/// Chooses a reference for a grid of voxels. Candidates are compared on a sample of its bricks.
+/// \param grids  the grids of a file. Those of `candidates` must be before `grid`, and those among
+///               them that hold no voxels are ignored.
+/// \return the reference with which the voxels take the fewest bytes of those that were tried, the
+///         empty one among them. They may take even fewer without a reference (bytesAdded).
+[[nodiscard]] VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
+                                             std::span<const std::size_t> candidates);
+
+/// The grid that a reference names, with the values that are expected for the grid that refers to
+/// it. As ConvertOptions::previous it makes a conversion choose voxels that take few bytes with this
+/// reference.
+/// \param grid  refers to the other grid
+[[nodiscard]] StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
+                                      const VoxelReference& reference);
+
+// Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
+// quantised, and their intensities are solved for again.
+
+struct CompactOptions {
+  /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32. With
+  /// 0.1 dB, a file is hardly worse than its fit; 0.3 dB would save 2 to 11 % of the bytes.
+  double loss = 0.1;
+  /// PSNR over the box, in dB, that the smallest result must reach. It replaces `loss`.
+  std::optional<double> psnr{};
+  /// Bytes that the ellipsoids of the best result may take. It replaces `loss` and `psnr`.
+  std::optional<std::uint64_t> bytes{};
+  std::optional<Box> box{};      ///< box of the PSNR; default: the active bounding box
+  std::optional<double> peak{};  ///< peak of the PSNR, above 0; default: peakOf() of the source
+  Device device{};               ///< device that evaluates the trials
+  /// The result is made in about the time of three evaluations of the grid: the steps are those with
+  /// which a search would begin, or, for `bytes`, the first that fit; the intensities are rounded but
+  /// not solved for, and there are no errors of layers. It serves for
+  /// forecasts, and to complete a conversion that was cancelled.
+  bool quick = false;
+};
+
+struct CompactResult {
+  StoredGrid grid;  ///< the quantised grid; its field is the one that a reader gets
+  QuantiserSteps steps;
+  double loss = 0.0;        ///< dB; negative if solving for the intensities gained more
+  std::uint64_t bytes = 0;  ///< bytes of the ellipsoids
+};
+
+/// Compacts a grid. The result is deterministic on one device. Devices round differently, so that
+/// they may choose different steps. If the wanted PSNR or size is out of reach, the result is the
+/// nearest one found.
+/// \param grid  a grid that makeStoredGrid made from `source`; Ellipsoids::kappa must be empty
+/// \throws RuntimeFailure  no quantisation lattice can hold the ellipsoids, or each ellipsoid has
+///                         its own kappa
+/// \throws DeviceError  the GPU cannot be used
+[[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
+                                        const CompactOptions& options = {});
+
+// Coarser levels of detail of a grid: the most important of its ellipsoids.
+
+/// Keeps the first importance layers of a grid and drops its residual. A grid that has no more
+/// layers is returned unchanged.
+[[nodiscard]] StoredGrid firstLayers(StoredGrid grid, std::size_t layers);
+
+/// Keeps the `count` ellipsoids of the largest weight of a grid, in their order. The weight is
+/// |I| sqrt(s1 s2 s3): the root of the ellipsoid's sum of squares over voxels, up to a factor that
+/// depends on kappa only. The result has no quantised form, no layers and no residual. A grid that
+/// has no more ellipsoids is returned unchanged.
+[[nodiscard]] StoredGrid heaviest(StoredGrid grid, std::size_t count);
+
+// A residual corrects the sum of ellipsoids voxel by voxel where its sign is wrong.
+
+/// Corrects the sign of every voxel of a narrow band where the sum has another one than the source,
+/// by a residual. A reader on any machine then finds the signs of the source: evaluations on different
+/// machines differ by rounding (field.h), and the residual includes a margin for that.
+/// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
+/// \return the grid without a residual if no sign is wrong
+[[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
+
+}  // namespace esvr

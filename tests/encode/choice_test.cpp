@@ -1,0 +1,185 @@
+// Plan: for each goal, one volume is converted for which ellipsoids are better and one for which
+// voxels are better. The better representation is stored, and the record of the choice has the
+// figures of both. Each representation can be prescribed. Contradictory options are refused.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "encode/volumes.h"
+#include "esvr/encode.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+Conversion choose(const SparseVolume& volume, const Goal& goal,
+                  Representation representation = Representation::kAuto) {
+  ConvertOptions options;
+  options.goal = goal;
+  options.representation = representation;
+  options.fit.iterations = 200;
+  options.fit.kappa = 0.0f;
+  return convertVolume({{}, volume}, options);
+}
+
+double psnrOver(const SparseVolume& volume, const Conversion& conversion) {
+  return compareVolumes(volume, decodeGrid(conversion.grid)).psnrBox;
+}
+
+TEST(ChoiceForAPsnr, TakesVoxelsOfNoise) {
+  const SparseVolume volume = test::noiseVolume(2);
+  const Conversion conversion = choose(volume, PsnrGoal{40.0});
+  ASSERT_TRUE(conversion.grid.voxels);
+  EXPECT_EQ(conversion.fit.end, FitEnd::kPsnrReached);
+  EXPECT_GE(psnrOver(volume, conversion), 40.0);
+  ASSERT_TRUE(conversion.choice && conversion.choice->ellipsoids);
+  EXPECT_TRUE(conversion.choice->ellipsoids->estimated)
+      << "a short fit shows that voxels are right";
+  EXPECT_GT(conversion.choice->ellipsoids->seconds, 0.0);
+  EXPECT_GT(conversion.choice->voxels->seconds, 0.0);
+  EXPECT_GT(conversion.choice->ellipsoids->bytes, bytesAdded(conversion.grid));
+}
+
+TEST(ChoiceForAPsnr, SlowTakesEllipsoidsOfBlobs) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion conversion = choose(volume, PsnrGoal{35.0});
+  EXPECT_FALSE(conversion.grid.voxels);
+  EXPECT_GE(psnrOver(volume, conversion), 35.0);
+  ASSERT_TRUE(conversion.choice && conversion.choice->voxels);
+  EXPECT_EQ(conversion.choice->ellipsoids->bytes, bytesAdded(conversion.grid));
+  EXPECT_LT(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
+}
+
+TEST(ChoiceForAPsnr, SlowStoresTheRepresentationThatIsInsistedOn) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion voxels = choose(volume, PsnrGoal{35.0}, Representation::kVoxels);
+  EXPECT_TRUE(voxels.grid.voxels);
+  EXPECT_FALSE(voxels.choice->ellipsoids);
+  EXPECT_GE(psnrOver(volume, voxels), 35.0);
+  EXPECT_FALSE(choose(volume, PsnrGoal{35.0}, Representation::kEllipsoids).grid.voxels);
+}
+
+TEST(ChoiceForAPsnr, ThatIsCancelledBeforeItBeginsHasNoResult) {
+  const SparseVolume volume = test::smoothVolume();
+  CancelToken cancel;
+  cancel.cancel();
+  for (const Goal& goal : {Goal{PsnrGoal{35.0}}, Goal{SizeGoal{20000}}}) {
+    ConvertOptions options;
+    options.goal = goal;
+    options.fit.cancel = &cancel;
+    EXPECT_THROW((void)convertVolume({{}, volume}, options), Cancelled);
+  }
+}
+
+TEST(ChoiceForASize, TakesVoxelsOfNoise) {
+  const SparseVolume volume = test::noiseVolume(2);
+  const Conversion conversion = choose(volume, SizeGoal{3000});
+  EXPECT_TRUE(conversion.grid.voxels);
+  EXPECT_LE(bytesAdded(conversion.grid), 3000u);
+  ASSERT_TRUE(conversion.choice && conversion.choice->ellipsoids);
+  EXPECT_GT(*conversion.choice->voxels->psnr, *conversion.choice->ellipsoids->psnr);
+}
+
+TEST(ChoiceForASize, SlowTakesEllipsoidsOfBlobs) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion conversion = choose(volume, SizeGoal{2000});
+  EXPECT_FALSE(conversion.grid.voxels);
+  EXPECT_LE(bytesAdded(conversion.grid), 2000u);
+  ASSERT_TRUE(conversion.choice && conversion.choice->voxels);
+  EXPECT_TRUE(conversion.choice->voxels->estimated)
+      << "a short fit and the first bricks show that ellipsoids are right";
+  EXPECT_GT(conversion.choice->voxels->bytes, 2000u);
+  EXPECT_GT(conversion.choice->voxels->seconds, 0.0);
+  EXPECT_EQ(*conversion.choice->ellipsoids->psnr, psnrOver(volume, conversion));
+}
+
+TEST(ChoiceForASize, TakesExactVoxelsWhereTheyFit) {
+  const SparseVolume volume = test::noiseVolume(1);
+  const Conversion conversion = choose(volume, SizeGoal{1'000'000});
+  EXPECT_EQ(decodeGrid(conversion.grid).values, volume.values);
+}
+
+/// The PSNR over the active voxels that a reader gets; errors at inactive voxels count too.
+double psnrOfActive(const SparseVolume& volume, const Conversion& conversion) {
+  const auto box = activeBox(volume).volume();
+  return psnrOver(volume, conversion) - 10.0 * std::log10(box / double(activeVoxelCount(volume)));
+}
+
+TEST(ChoiceForAPreset, SlowHasItsQualityOverTheActiveVoxels) {
+  const SparseVolume volume = test::noiseVolume(3);
+  std::uint64_t before = 0;
+  for (const Preset preset : {Preset::kDraft, Preset::kStandard, Preset::kHigh}) {
+    ConvertOptions options;
+    options.goal = PresetGoal{};
+    options.fit.preset = preset;
+    const Conversion conversion = convertVolume({{}, volume}, options);
+    EXPECT_GE(psnrOfActive(volume, conversion), presetPsnr(preset));
+    EXPECT_LE(psnrOfActive(volume, conversion), presetPsnr(preset) + 1.0);
+    EXPECT_GT(bytesAdded(conversion.grid), before);
+    before = bytesAdded(conversion.grid);
+  }
+}
+
+TEST(ChoiceForAPreset, CountsTheActiveVoxelsOfTheBox) {
+  const SparseVolume volume = test::noiseVolume(2);
+  ConvertOptions options;
+  options.goal = PresetGoal{};
+  options.fit.box = Box{{0, 0, 0}, {63, 63, 63}};
+  const Conversion conversion = convertVolume({{}, volume}, options);
+  const double psnr =
+      compareVolumes(volume, decodeGrid(conversion.grid), {.box = options.fit.box}).psnrBox;
+  const double wider = 10.0 * std::log10(64.0 * 64.0 * 64.0 / double(activeVoxelCount(volume)));
+  EXPECT_GE(psnr, presetPsnr(options.fit.preset) + wider);
+}
+
+TEST(ChoiceForAPreset, SlowStoresTheRepresentationThatIsInsistedOn) {
+  const SparseVolume volume = test::smoothVolume();
+  EXPECT_TRUE(choose(volume, PresetGoal{}, Representation::kVoxels).grid.voxels);
+  EXPECT_FALSE(choose(volume, PresetGoal{}, Representation::kEllipsoids).grid.voxels);
+}
+
+TEST(ChoiceForAPreset, StoresAConstantInAFewBytes) {
+  const SparseVolume flat = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
+  const Conversion conversion = choose(flat, PresetGoal{});
+  EXPECT_EQ(decodeGrid(conversion.grid).values, flat.values);
+  EXPECT_LT(bytesAdded(conversion.grid), 600u);
+}
+
+TEST(Choice, SlowVoxelsKeepTheMaskOfALevelSetOnly) {
+  const SparseVolume band = test::levelSetVolume();
+  const auto iou = [&](GridClass gridClass, const Goal& goal) {
+    GridDescriptor descriptor;
+    descriptor.gridClass = gridClass;
+    ConvertOptions options;
+    options.goal = goal;
+    options.representation = Representation::kVoxels;
+    const Conversion conversion = convertVolume({descriptor, band}, options);
+    return compareVolumes(band, decodeGrid(conversion.grid)).iou;
+  };
+  for (const Goal& goal : {Goal{PsnrGoal{25.0}}, Goal{BoundGoal{0.1, true}}}) {
+    EXPECT_EQ(iou(GridClass::kLevelSet, goal), 1.0);
+    EXPECT_LT(iou(GridClass::kFogVolume, goal), 1.0);
+  }
+}
+
+TEST(ChoiceForAFit, SlowTakesExactVoxelsWhereEllipsoidsWouldTakeMoreBytes) {
+  const SparseVolume flat = test::volumeOf({}, 4, 0.0f, [](Coord) { return 0.5f; });
+  const Conversion conversion = choose(flat, FitGoal{});
+  EXPECT_TRUE(conversion.grid.voxels);
+  EXPECT_EQ(decodeGrid(conversion.grid).values, flat.values);
+  EXPECT_FALSE(choose(test::smoothVolume(), FitGoal{}).grid.voxels);
+}
+
+TEST(Choice, RefusesWhatExcludesEachOther) {
+  const SparseVolume volume = test::noiseVolume(1);
+  EXPECT_THROW((void)choose(volume, FitGoal{}, Representation::kVoxels), UsageError);
+  EXPECT_THROW((void)choose(volume, LosslessGoal{}, Representation::kEllipsoids), UsageError);
+  EXPECT_THROW((void)choose(volume, SizeGoal{40}), UsageError);
+  EXPECT_THROW((void)choose(volume, SizeGoal{40}, Representation::kVoxels), UsageError);
+}
+
+}  // namespace
+}  // namespace esvr

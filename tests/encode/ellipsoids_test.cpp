@@ -1,0 +1,220 @@
+// Plan: the search for ellipsoids of a PSNR continues its short fit and its first whole fit instead of
+// beginning again with seeds, and makes no more whole fits than it promises. A search that is cancelled
+// keeps its best fit. Forecasts say where ellipsoids cannot win. Intensities have both signs where this is
+// better, and only there: a gyroid with a plateau is such a volume; smooth blobs are not.
+
+#include "encode/ellipsoids.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "encode/volumes.h"
+#include "esvr/encode.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+using encode::EllipsoidSearch;
+
+constexpr std::uint32_t kWholeFit = 400;
+
+/// A search in a volume, with options that outlive it.
+struct Searched {
+  GridDescriptor descriptor;
+  SparseVolume volume;
+  ConvertOptions options;
+  ConvertInput input{descriptor, volume};
+  EllipsoidSearch search;
+
+  Searched(SparseVolume of, ConvertOptions with, const EllipsoidSearch::Goal& goal)
+      : volume(std::move(of)), options(std::move(with)), search({input, options}, goal) {}
+};
+
+ConvertOptions ofIterations(std::uint32_t iterations) {
+  ConvertOptions options;
+  options.fit.iterations = iterations;
+  options.fit.kappa = 2.0f;
+  return options;
+}
+
+TEST(EllipsoidSearch, SlowReachesAPsnrOrSaysThatItDoesNot) {
+  std::set<std::uint32_t> iterations;
+  for (const double psnr : {28.0, 30.0, 32.0, 34.0, 36.0, 38.0}) {
+    Searched made(test::tubeVolume(), ofIterations(kWholeFit), {.psnr = psnr});
+    made.search.draft();
+    const auto found = made.search.run();
+    EXPECT_EQ(found->fit.end == FitEnd::kPsnrReached,
+              psnrOverBox(made.volume, decodeGrid(found->grid)) >= psnr);
+    EXPECT_LE(found->fit.curve.back().iteration, kWholeFit);
+    iterations.insert(found->fit.curve.back().iteration);
+  }
+  EXPECT_GT(iterations.size(), 1u) << "fits for more bytes are longer, and continued ones shorter";
+}
+
+TEST(EllipsoidSearch, MakesNoMoreWholeFitsThanItPromises) {
+  ConvertOptions options = ofIterations(120);
+  int fits = 0;
+  double last = 1.0;
+  options.fit.progress = [&](const FitProgress& progress) {
+    fits += progress.fraction < last;
+    last = progress.fraction;
+  };
+  Searched made(test::noiseVolume(2), options, {.psnr = 90.0});
+  made.search.draft();
+  fits = 0;
+  EXPECT_EQ(made.search.run()->fit.end, FitEnd::kPsnrMissed);
+  EXPECT_LE(fits, encode::planOf({made.input, made.options}).wholeFits);
+}
+
+TEST(EllipsoidSearch, KeepsItsFirstFitWhereItIsCancelled) {
+  CancelToken cancel;
+  ConvertOptions options;
+  options.fit.iterations = 1'000'000;
+  options.fit.cancel = &cancel;
+  options.fit.progress = [&](const FitProgress&) { cancel.cancel(); };
+  Searched made(test::tubeVolume(), options, {.psnr = 60.0});
+  made.search.draft();
+  const auto found = made.search.run();
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->fit.end, FitEnd::kCancelled);
+  EXPECT_GT(found->grid.field.ellipsoidCount(), 0u);
+}
+
+TEST(EllipsoidSearch, EndsWhereItsShortFitsAreCancelled) {
+  CancelToken cancel;
+  cancel.cancel();
+  Searched made(test::tubeVolume(), ofIterations(60), {.psnr = 28.0});
+  EXPECT_THROW(made.search.draft(&cancel), Cancelled);
+  EXPECT_FALSE(made.search.hasDraft());
+}
+
+TEST(EllipsoidSearch, ForecastsWhatCannotWin) {
+  Searched noise(test::noiseVolume(3), ofIterations(60), {.psnr = 45.0, .below = 20000});
+  noise.search.draft();
+  EXPECT_FALSE(noise.search.mayStayBelow(20000));
+  Searched smooth(test::smoothVolume(), ofIterations(200), {.psnr = 35.0, .below = 100'000});
+  smooth.search.draft();
+  EXPECT_TRUE(smooth.search.mayStayBelow(100'000));
+  EXPECT_GT(smooth.search.expectedBytes(), 0u);
+  Searched sized(test::smoothVolume(), ofIterations(200), {.bytes = 2000});
+  sized.search.draft();
+  EXPECT_TRUE(sized.search.mayReach(sized.search.expectedPsnr()));
+  EXPECT_FALSE(sized.search.mayReach(sized.search.expectedPsnr() + 10.0));
+}
+
+TEST(EllipsoidSearch, FillsASize) {
+  for (const std::uint64_t bytes : {1200u, 4000u}) {
+    Searched made(test::smoothVolume(), ofIterations(100), {.bytes = bytes});
+    made.search.draft();
+    const auto found = made.search.run();
+    ASSERT_TRUE(found);
+    EXPECT_LE(bytesAdded(found->grid), bytes);
+    EXPECT_GE(double(bytesAdded(found->grid)), 0.97 * double(bytes));
+  }
+}
+
+TEST(EllipsoidSearch, SaysWhatASizeThatIsTooSmallNeeds) {
+  Searched made(test::smoothVolume(), ofIterations(60), {.bytes = 60});
+  made.search.draft();
+  EXPECT_FALSE(made.search.run());
+}
+
+TEST(Plan, GivesLessTimeToLargeVolumesOfACpuAndToLittleEffort) {
+  const SparseVolume volume = test::noiseVolume(2);
+  const GridDescriptor descriptor;
+  const ConvertInput input{descriptor, volume};
+  ConvertOptions options;
+  std::uint32_t before = 0;
+  for (options.effort = kLeastEffort; options.effort <= kMostEffort; ++options.effort) {
+    const encode::Plan plan = encode::planOf({input, options});
+    EXPECT_GT(plan.wholeIterations, before);
+    EXPECT_LE(plan.shortIterations, plan.wholeIterations);
+    EXPECT_TRUE(plan.fitsInTime);
+    before = plan.wholeIterations;
+  }
+  SparseVolume large;  // the plan looks at the number of bricks alone
+  large.bricks.resize(200'000);
+  options.effort = kUsualEffort;
+  EXPECT_FALSE(encode::planOf({{descriptor, large}, options}).fitsInTime);
+}
+
+// ---- Signs
+
+/// A gyroid whose inside is a plateau. Many of its borders are concave.
+SparseVolume gyroidVolume() {
+  constexpr double kTurns = 2.0 * std::numbers::pi / 22.0;  // a period of 22 voxels
+  return test::volumeOf({}, 4, 0.0f, [](Coord v) {
+    const double x = kTurns * v.x, y = kTurns * v.y, z = kTurns * v.z;
+    const double g =
+        std::sin(x) * std::cos(y) + std::sin(y) * std::cos(z) + std::sin(z) * std::cos(x);
+    return float(std::clamp(2.0 * g, 0.0, 1.0));
+  });
+}
+
+const GridDescriptor& descriptor() {
+  static const GridDescriptor grid = [] {
+    GridDescriptor g;
+    g.name = "density";
+    return g;
+  }();
+  return grid;
+}
+
+ConvertOptions searching(const Goal& goal) {
+  ConvertOptions options;
+  options.goal = goal;
+  options.representation = Representation::kEllipsoids;
+  options.fit.iterations = 800;
+  return options;
+}
+
+Conversion converted(const SparseVolume& volume, const ConvertOptions& options) {
+  return convertVolume({descriptor(), volume}, options);
+}
+
+double psnrOf(const SparseVolume& volume, const Conversion& conversion) {
+  return compareVolumes(volume, decodeGrid(conversion.grid)).psnrBox;
+}
+
+TEST(Signs, SlowAreBothForAGyroidOfAGivenSize) {
+  const SparseVolume gyroid = gyroidVolume();
+  ConvertOptions options = searching(SizeGoal{6000});
+  const Conversion free = converted(gyroid, options);
+  options.fit.bothSigns = false;
+  const Conversion positive = converted(gyroid, options);
+  EXPECT_TRUE(free.fit.signedIntensities);
+  EXPECT_FALSE(positive.fit.signedIntensities);
+  EXPECT_GT(psnrOf(gyroid, free), psnrOf(gyroid, positive) + 1.0);
+}
+
+TEST(Signs, SlowAreChosenAfterAShortFit) {
+  const Conversion conversion = converted(gyroidVolume(), searching(PsnrGoal{40.0}));
+  EXPECT_TRUE(conversion.fit.signedIntensities);
+  EXPECT_TRUE(conversion.decisions.bothSigns.tried && conversion.decisions.bothSigns.used);
+  EXPECT_GT(conversion.decisions.bothSigns.seconds, 0.0);
+}
+
+TEST(Signs, AreThoseOfTheValuesWhereFewAreExtreme) {
+  ConvertOptions options = searching(SizeGoal{1500});
+  options.fit.iterations = 60;
+  EXPECT_FALSE(converted(test::smoothVolume(), options).decisions.bothSigns.tried);
+}
+
+TEST(Signs, OfAnOptionAreKept) {
+  ConvertOptions options = searching(SizeGoal{1500});
+  options.fit.iterations = 60;
+  options.fit.bothSigns = false;
+  const Conversion conversion = converted(gyroidVolume(), options);
+  EXPECT_FALSE(conversion.fit.signedIntensities);
+  EXPECT_FALSE(conversion.decisions.bothSigns.tried);
+}
+
+}  // namespace
+}  // namespace esvr
