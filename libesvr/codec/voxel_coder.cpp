@@ -906,12 +906,12 @@ class VoxelCoder {
   const Thrift* thrift_;
   std::size_t partBricks_ = 0;     ///< bricks of this part of the stream that are no copies
   std::uint32_t lastSource_ = 0;   ///< source of the latest brick that was a copy
-  std::uint32_t lastVacancy_ = 0;  ///< of the latest brick that has one
+  std::uint32_t lastVacancy_ = 0;  ///< vacancy of the latest brick that has one
   bool allActive_ = false, lastFlat_ = false;
   Halo halo_{};
   std::array<std::uint8_t, Halo::kCells>
       class_{};  ///< the numbers of the codes in the halo (classOf)
-  std::conditional_t<kSets, std::int32_t*, const std::int32_t*> codes_ = nullptr;  ///< of the brick
+  std::conditional_t<kSets, std::int32_t*, const std::int32_t*> codes_ = nullptr;  ///< codes of the brick
   RuleErrors errors_;
   std::uint32_t imageError_ = 0;
   VoxelDifferences differences_;

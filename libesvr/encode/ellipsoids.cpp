@@ -249,7 +249,7 @@ const Attempt* EllipsoidSearch::startFor(double count) const {
     if (a.cancelled() || growth < kLeastGrowth || growth > kMostGrowth) return;
     if (!start || distance(a) <= distance(*start)) start = &a;
   };
-  // Where many voxels saturate, a continued fit is worse (dragon: 46.8 dB instead of 48.2).
+  // Where many voxels saturate, a continued fit is worse (dragon: 46.8 dB instead of 48.1).
   if (draft_ && !saturates_) consider(*draft_);
   for (const Attempt& a : attempts_) consider(a);
   return start;
@@ -359,7 +359,7 @@ void EllipsoidSearch::decideSigns() {
 }
 
 /// Takes the price of an ellipsoid and the bytes of the other sections from the short fit. The price is
-/// known to a fifth without a search for the best steps, which decides enough for a PSNR. The number of
+/// known to a quarter without a search for the best steps, which decides enough for a PSNR. The number of
 /// ellipsoids of a size follows from it.
 void EllipsoidSearch::forecast() {
   if (draft_->cancelled() || !compact_) return;

@@ -14,8 +14,8 @@ struct Tuning {
   /// Active voxels per ellipsoid of the first guess for a PSNR, and at the largest number of
   /// ellipsoids that a preset may take. With more of them, voxels take fewer bytes.
   double voxelsOfFirstGuess = 35.0, leastVoxelsEach = 8.0;
-  /// Bytes that an ellipsoid takes usually and at least, and the price in a short fit relative to
-  /// that in a whole one (smoke1, dragon, aneurism: 6.8 to 9.1 bytes, 0.92 to 0.97).
+  /// Bytes that an ellipsoid takes usually (by default 6.7 in smoke1 and plume_256, 8.1 in dragon) and at
+  /// least, and its price in a short fit relative to that in a whole one.
   double usualBytesEach = 7.5, leastBytesEach = 4.5, shortFitPrice = 0.94;
   /// PSNR of a whole fit less that of a short one, dB: smoke1 and wdas have 1.3 to 1.6. Where many
   /// voxels saturate it is 5 to 6 (dragon, aneurism), since a clamped voxel has no gradient.
@@ -40,7 +40,7 @@ struct Tuning {
   double sizedShare = 0.6;
   /// Bricks up to which a whole fit on the CPU has all iterations of its preset; larger volumes have
   /// fewer in proportion. An iteration takes 5 to 13 us of two cores for each brick of smoke1,
-  /// aneurism and neuron_m207, so that a whole fit takes 10 to 27 seconds.
+  /// aneurism and neuron_m207, before the kernels of the fit took half of the time.
   double bricksOfWholeFit = 2100.0;
   /// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the
   /// bytes of a short one, which for fewer bytes is worth less time in proportion (hydrogen_atom: 560
