@@ -911,7 +911,8 @@ class VoxelCoder {
   Halo halo_{};
   std::array<std::uint8_t, Halo::kCells>
       class_{};  ///< the numbers of the codes in the halo (classOf)
-  std::conditional_t<kSets, std::int32_t*, const std::int32_t*> codes_ = nullptr;  ///< codes of the brick
+  std::conditional_t<kSets, std::int32_t*, const std::int32_t*> codes_ =
+      nullptr;  ///< codes of the brick
   RuleErrors errors_;
   std::uint32_t imageError_ = 0;
   VoxelDifferences differences_;
