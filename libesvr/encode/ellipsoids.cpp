@@ -34,11 +34,14 @@ Representation representationOf(const Job& job) {
   return job.options.representation;
 }
 
+double effortFactor(int effort) {
+  return std::pow(effort < kUsualEffort ? 2.0 : 1.5, effort - kUsualEffort);
+}
+
 Plan planOf(const Job& job) {
   const Tuning& tuning = kTuning;
   const int effort = job.options.effort;
-  // A step of effort below the middle halves the time of a fit; above it, fits take half as long again.
-  const double factor = std::pow(effort < kUsualEffort ? 2.0 : 1.5, effort - kUsualEffort);
+  const double factor = effortFactor(effort);
   const double wanted = plannedIterations(job.options.fit);
   const double bricks = double(std::max<std::size_t>(job.input.source.brickCount(), 1));
   const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;

@@ -233,7 +233,10 @@ class Choice {
 /// The result of a single fit, or exact voxels if they take no more bytes. No fit is made if its number
 /// of ellipsoids shows that it cannot be smaller.
 Conversion fitOrExact(const Job& job) {
-  const FitOptions& options = job.options.fit;
+  FitOptions options = job.options.fit;
+  if (!options.iterations && job.options.effort != kUsualEffort)
+    options.iterations =
+        std::uint32_t(std::ceil(effortFactor(job.options.effort) * plannedIterations(options)));
   double seconds = 0.0;
   const auto fitted = [&] {
     return addSeconds(seconds, [&] {

@@ -44,4 +44,8 @@ struct Plan {
 };
 [[nodiscard]] Plan planOf(const Job& job);
 
+/// The number by which an effort multiplies the iterations of a fit. A step below the usual effort
+/// halves them; a step above it makes them half as many again.
+[[nodiscard]] double effortFactor(int effort);
+
 }  // namespace esvr::encode

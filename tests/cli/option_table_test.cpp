@@ -40,6 +40,7 @@ Table vdb2esvrTests() {
           {"--chunk-voxels", "Vdb2EsvrOption.chunkVoxelsDivideTheFit"},
           {"--count", "Vdb2EsvrOption.countIsTheNumberOfEllipsoids"},
           {"--device", "Vdb2EsvrOption.devicesAreTakenAsNamed"},
+          {"--effort", "Vdb2EsvrOption.effortLengthensTheFit"},
           {"--force", "Vdb2Esvr.keepsAnExistingFileUnlessForced"},
           {"--frames", "SequenceFiles.haveTheBytesOfSingleFilesOnAnyNumberOfThreads"},
           {"--grid", "Vdb2Esvr.fitsTheGridsThatAreNamedOnly"},

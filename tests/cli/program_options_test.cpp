@@ -59,6 +59,16 @@ TEST_F(Vdb2EsvrOption, iterationsEndTheFit) {
   EXPECT_EQ(grid["curve"].back()["iteration"], 33);
 }
 
+TEST_F(Vdb2EsvrOption, effortLengthensTheFit) {
+  const auto iterations = [&](const char* effort) {
+    const Json grid =
+        convert({"--count", "5", "--effort", effort, "--representation", "ellipsoids"})["grids"][0];
+    return grid["curve"].back()["iteration"].get<int>();
+  };
+  EXPECT_LT(iterations("1"), iterations("5"));
+  EXPECT_LT(iterations("5"), iterations("7"));
+}
+
 TEST_F(Vdb2EsvrOption, ratioBoundsTheFile) {
   const std::uintmax_t bytes = sizeOf("in.vdb");
   for (const char* ratio : {"4", "8"}) {
