@@ -475,6 +475,7 @@ Conversion RowMaker::convert(const FitWish& wish, std::uint64_t head) const {
   const ConvertInput input{scene_.reference.descriptor, scene_.reference.volume};
   if (wish.paper)
     return convertByPaper(input, {options.fit, {}}, {.form = Storage::kFloat32}).conversion;
+  options.measure = Measure::kValues;  // the rows of rivals are matched by the PSNR of values, too
   if (wish.bytes) options.goal = SizeGoal{*wish.bytes - head};
   return convertVolume(input, options);
 }

@@ -124,6 +124,9 @@ void addGoalOptions(cli::po::options_description& options) {
     ("psnr", value<std::string>()->value_name("DB"),
      "write the smallest file that reaches this PSNR over the box; NAME=DB is that of one grid: "
      "density=50,temperature=40, or 40,density=50 with 40 for all others")
+    ("picture-psnr", value<double>()->value_name("DB"),
+     "write the smallest file whose transmittance has this PSNR (column PSNR T 0.5), for grids that are "
+     "looked through; other grids have the quality of --preset")
     ("lossless", bool_switch(),
      "store voxels and active mask bit for bit, without ellipsoids; grids that have other inactive "
      "values than the background are carried unchanged")
@@ -132,6 +135,13 @@ void addGoalOptions(cli::po::options_description& options) {
      "bound of one grid, as with --psnr; voxels are stored")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
+    ("measure", value<std::string>()->value_name("M")->default_value("auto"),
+     "what the quality of --preset, --size and --ratio means. auto: what is seen of fog volumes, and the "
+     "PSNR of values for all other grids; values: the PSNR of values for all grids")
+    ("tone", value<std::string>()->value_name("S")->default_value("auto"),
+     "code values v as S asinh(v / S), so that faint smoke keeps its shape beside dense smoke. auto: "
+     "where the measure is what is seen and it pays; off: never; or the scale S, in units of the values, for "
+     "all grids with a background of 0")
     ("topology", value<std::string>()->value_name("T")->default_value("auto"),
      "how active voxels are stored. auto: by their values, so that voxels that differ from the "
      "background by no more than the error may become inactive; their bounding box stays, and level "
@@ -145,8 +155,8 @@ void addFitOptions(cli::po::options_description& options) {
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
     ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "quality without another target: draft, standard or high stand for a PSNR of 32, 40 or 50 dB "
-     "over the active voxels; in a single fit, the count and the iterations that are not given")
+     "quality without another target: draft, standard or high stand for a PSNR of 30, 38 or 46 dB of the "
+     "transmittance of fog volumes, and of 32, 40 or 50 dB over the active voxels of other grids; in a single fit, the count and the iterations that are not given")
     ("effort", value<std::int64_t>()->value_name("E")->default_value(std::int64_t(kUsualEffort)),
      "time to take, from 1 (shortest) to 9 (longest)")
     ("box", value<std::string>()->value_name("BOX"),

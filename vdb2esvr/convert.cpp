@@ -119,6 +119,7 @@ void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
   ConvertOptions wanted = options.convert;
   wanted.previous = wish.previous;
   if (wish.bytes) wanted.goal = SizeGoal{*wish.bytes};
+  if (grid.id.component) wanted.measure = Measure::kValues;
   // The parts of a single fit do not depend on the storage, and compact storage takes time.
   if (options.onlyFits && std::holds_alternative<FitGoal>(wanted.goal))
     wanted.storage.form = Storage::kFloat32;

@@ -190,14 +190,34 @@ Representation representation(const Arguments& a) {
                                       {"voxels", Representation::kVoxels}});
 }
 
+Measure measure(const Arguments& a) {
+  return cli::choose<Measure>("measure", a.get<std::string>("measure"),
+                              {{"auto", Measure::kAuto}, {"values", Measure::kValues}});
+}
+
+/// \return nothing: the conversion chooses
+std::optional<ToneCurve> toneCurve(const Arguments& a) {
+  const auto text = a.get<std::string>("tone");
+  if (text == "auto") return std::nullopt;
+  if (text == "off") return ToneCurve{};
+  const auto scale = cli::parseNumber(text);
+  const bool isScale = scale && std::isfinite(float(*scale)) && float(*scale) > 0.0f;
+  if (!isScale)
+    throw UsageError("--tone must be auto, off or a scale above 0 such as 0.1, not '" + text + "'");
+  refuseWith(a, "tone S", {"lossless", "max-error", "paper"});
+  return ToneCurve{float(*scale)};
+}
+
 Goal losslessGoal(const Arguments& a) {
-  refuseWith(a, "lossless", {"max-error", "count", "psnr", "seconds", "size", "ratio", "paper"});
+  refuseWith(a, "lossless",
+             {"max-error", "count", "psnr", "picture-psnr", "seconds", "size", "ratio", "paper"});
   return LosslessGoal{};
 }
 
 Goal boundGoal(const Arguments& a, const Options& options) {
   refuseWith(a, "max-error", {"count", "seconds", "size", "ratio", "paper"});
   if (options.psnr) throw UsageError("--max-error cannot be combined with --psnr");
+  refuseWith(a, "max-error", {"picture-psnr"});
   return *options.maxError;
 }
 
@@ -218,6 +238,11 @@ Goal goalOf(const Arguments& a, const Options& options) {
   if (a.get<bool>("lossless")) return losslessGoal(a);
   requireGridGoals(a, options);
   if (options.maxError) return boundGoal(a, options);
+  if (options.picturePsnr) {
+    refuseWith(a, "picture-psnr",
+               {"psnr", "count", "seconds", "iterations", "size", "ratio", "paper"});
+    return PictureGoal{*options.picturePsnr};
+  }
   if (options.psnr && !options.convert.fit.seconds && !options.paper)
     return PsnrGoal{*options.psnr};
   return isSingleFit(a) ? Goal(FitGoal{}) : PresetGoal{};
@@ -323,6 +348,9 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.shares =
       cli::choose<bool>("share", a.get<std::string>("share"), {{"auto", true}, {"off", false}});
   readGridGoals(a, options);
+  options.picturePsnr = bounded<double>(a, "picture-psnr", 0.0, kHighestPsnr);
+  options.convert.measure = measure(a);
+  options.convert.tone = toneCurve(a);
   options.convert.fit = fitOptions(a);
   options.convert.fit.psnr = options.psnr;
   options.convert.storage = storageOptions(a);

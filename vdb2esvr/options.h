@@ -40,6 +40,7 @@ struct Options {
   ConvertOptions convert;             ///< options of every grid; a size replaces the goal
   std::vector<GridGoal> gridGoals;    ///< goals of single grids instead of that in `convert`
   std::optional<double> psnr;         ///< PSNR that all other grids should reach, dB over the box
+  std::optional<double> picturePsnr;  ///< PSNR of what is seen of grids that are looked through, dB
   std::optional<BoundGoal> maxError;  ///< largest error of all other grids
   std::optional<std::uint64_t> size;  ///< largest size of the file, bytes
   std::optional<double> ratio;        ///< size of the input relative to that of the file

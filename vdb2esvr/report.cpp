@@ -81,6 +81,12 @@ Json goalsOf(const std::vector<GridGoal>& goals) {
   return list;
 }
 
+/// The tone curve that was asked for.
+Json toneJson(const std::optional<ToneCurve>& tone) {
+  if (!tone) return "auto";
+  return tone->isOn() ? Json(tone->scale) : Json("off");
+}
+
 }  // namespace
 
 Json askedJson(const Options& options) {
@@ -88,6 +94,9 @@ Json askedJson(const Options& options) {
   const StorageOptions& storage = options.convert.storage;
   return {{"count", orNull(fit.count)},
           {"psnr", orNull(options.psnr)},
+          {"picture_psnr", orNull(options.picturePsnr)},
+          {"measure", options.convert.measure == Measure::kAuto ? "auto" : "values"},
+          {"tone", toneJson(options.convert.tone)},
           {"size", orNull(options.size)},
           {"ratio", orNull(options.ratio)},
           {"lossless", std::holds_alternative<LosslessGoal>(options.convert.goal)},
@@ -330,6 +339,8 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"ellipsoids", grid.stored().field.ellipsoidCount()},
           {"bytes", cli::ownBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},
+          {"measured", grid.conversion.byPictures ? "pictures" : "values"},
+          {"tone", grid.stored().tone.isOn() ? Json(grid.stored().tone.scale) : Json(nullptr)},
           {"kernel", kernelOf(grid.stored().field.kernel)},
           {"topology", topologyOf(record, g)},
           {"fit", fitOf(grid)},

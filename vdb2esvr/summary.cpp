@@ -83,8 +83,20 @@ void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostr
   out << '\n';
 }
 
+/// Says that the goal was measured by what is seen, and which tone curve serves it.
+void printMeasure(const ConvertedGrid& grid, std::ostream& out) {
+  const ToneCurve tone = grid.stored().tone;
+  if (!grid.conversion.byPictures && !tone.isOn()) return;
+  out << cli::printable(grid.uniqueName) << ": ";
+  if (grid.conversion.byPictures) out << "judged by what is seen of it (PSNR T 0.5)";
+  if (grid.conversion.byPictures && tone.isOn()) out << ", with ";
+  if (tone.isOn()) out << "a tone curve of scale " << cli::shortNumber(tone.scale);
+  out << '\n';
+}
+
 /// Says how the data of a grid were made.
 void printNote(const ConvertedGrid& grid, std::ostream& out) {
+  printMeasure(grid, out);
   printSurface(grid, out);
   if (!grid.twinOf) {
     printRemark(grid, out);

@@ -124,6 +124,7 @@ esvr_grid describe(const StoredGrid& grid) {
   d.active_voxels = grid.activeVoxels;
   d.ellipsoids = grid.field.ellipsoidCount();
   d.has_residual = grid.residual ? 1 : 0;
+  d.tone = grid.tone.scale;
   return d;
 }
 

@@ -7,6 +7,7 @@
 
 #include "core/add_seconds.h"
 #include "encode/root_search.h"
+#include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "format/section_table.h"
@@ -20,7 +21,24 @@ bool isCancelled(const Job& job) {
   return cancel && cancel->cancelled();
 }
 
-double psnrOf(const Job& job, const SparseVolume& volume) {
+const SparseVolume& valuesOf(const Job& job) {
+  return job.judge ? job.judge->values() : job.input.source;
+}
+
+double boxGain(const SparseVolume& volume, const std::optional<Box>& given) {
+  const Box box = given.value_or(activeBox(volume));
+  std::uint64_t active = 0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      active += volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v));
+  const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
+  return 10.0 * std::log10(std::max(share, 1.0));
+}
+
+bool seesPictures(const Job& job) { return job.judge && job.judge->seesPictures(); }
+
+double psnrOf(const Job& job, SparseVolume volume) {
+  if (job.judge) return (*job.judge)(std::move(volume));
   return psnrOverBox(job.input.source, volume,
                      {.box = job.options.fit.box, .peak = job.options.fit.peak});
 }
@@ -174,16 +192,16 @@ constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
 constexpr std::uint64_t kRefillDivisor = 100;
+/// Limits of the loss by rounding for a judge, dB over the box, the difference of two that is not tried,
+/// the dB by which a rounded grid may exceed a PSNR, and the times that a fit is rounded for it.
+constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kNarrowestLoss = 0.01,
+                 kPsnrSpare = 0.12;
+constexpr int kMostRoundings = 4;
 /// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
 constexpr double kMinSlopeRatio = 1.15, kMinSlope = kDbPerDoubling / 2.0;
 
-/// dB by which the float32 grid should exceed the PSNR: the best value, and the limits within which
-/// the size hardly differs.
-struct Margin {
-  double aim, min, max;
-};
-constexpr Margin kCompactMargin{kTuning.usualLoss, 0.35, 2.0};
 constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
+Margin compactMargin(double usualLoss) { return {usualLoss, 0.39 * usualLoss, 2.2 * usualLoss}; }
 
 double countOf(const Attempt& a) { return double(std::max<std::size_t>(a.count(), 1)); }
 
@@ -197,12 +215,16 @@ double countFor(const Attempt& from, double psnr, double slope) {
 
 EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
     : options_(job.options),
-      job_{job.input, options_},
+      job_{job.input, options_, job.judge, job.firstFit},
       goal_(goal),
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
       saturates_(saturates(job.input.source)),
-      behind_(saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind),
+      rounding_(seesPictures(job) ? kTuning.seenRounding : kTuning.rounding),
+      margin_(compact_ ? compactMargin(rounding_.usualLoss * rounding_.factor) : kFloat32Margin),
+      behind_(seesPictures(job) ? kTuning.seenShortFitBehind
+              : saturates_      ? kTuning.shortFitBehindSaturated
+                                : kTuning.shortFitBehind),
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
@@ -214,9 +236,11 @@ void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
   maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kTuning.leastBytesEach) + 1);
 }
 
-FitOptions EllipsoidSearch::optionsFor(double count, std::uint32_t iterations) const {
-  FitOptions options = options_.fit;
-  const double most = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
+namespace {
+
+FitOptions optionsFor(const Job& job, double count, std::uint32_t iterations) {
+  FitOptions options = job.options.fit;
+  const double most = double(std::max<std::uint64_t>(activeVoxelCount(job.input.source), 1));
   options.count = std::size_t(std::clamp(std::floor(count), 1.0, most));
   options.psnr.reset();
   options.seconds.reset();
@@ -224,22 +248,41 @@ FitOptions EllipsoidSearch::optionsFor(double count, std::uint32_t iterations) c
   return options;
 }
 
-Attempt EllipsoidSearch::attempted(const FitOptions& options) const {
+Attempt attempted(const Job& job, const FitOptions& options) {
   Attempt result;
   result.asked = *options.count;
-  result.fit = fit(job_.input.source, options);
-  result.grid = storedGridOf(job_, result.fit);
+  result.bothSigns = options.bothSigns;
+  result.fit = fit(job.input.source, options);
+  result.grid = storedGridOf(job, result.fit);
   const auto psnr = unlessCancelled([&]() -> std::optional<double> {
     if (result.cancelled()) return std::nullopt;
-    return psnrOf(job_, result.grid);
+    return psnrOf(job, result.grid);
   });
   if (!psnr) result.fit.end = FitEnd::kCancelled;
   result.psnr = psnr.value_or(lastPsnr(result.fit));
   return result;
 }
 
+/// The number of ellipsoids of the first short fit for a size, and for a PSNR, of which the first fit scouts.
+double firstCount(const Job& job) {
+  if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
+    return kGrownFrom * double(size->bytes) / kTuning.usualBytesEach;
+  return std::min(double(activeVoxelCount(job.input.source)) / kTuning.voxelsOfFirstGuess,
+                  kMostOfFirstDraft);
+}
+
+}  // namespace
+
+Attempt shortFitOf(const Job& job) {
+  return attempted(job, optionsFor(job, firstCount(job), planOf(job).shortIterations));
+}
+
 Attempt EllipsoidSearch::shortFit(double count) const {
-  return attempted(optionsFor(count, plan_.shortIterations));
+  const FitOptions options = optionsFor(job_, count, plan_.shortIterations);
+  const Attempt* first = job_.firstFit;
+  const bool isMade = first && !first->cancelled() && first->asked == *options.count &&
+                      options.bothSigns == first->bothSigns;
+  return isMade ? *first : attempted(job_, options);
 }
 
 /// The attempt whose number of ellipsoids is nearest to a number and from which a fit can continue;
@@ -263,7 +306,7 @@ const Attempt* EllipsoidSearch::startFor(double count) const {
 /// better fit than a short one does (a plume of 20 KB: 0.7 dB), but one that is less like its forecast,
 /// by which a PSNR is found with one fit less.
 Attempt EllipsoidSearch::wholeFit(double count) const {
-  FitOptions options = optionsFor(count, plan_.wholeIterations);
+  FitOptions options = optionsFor(job_, count, plan_.wholeIterations);
   const auto iterationsOf = [&](double share) {
     return std::max(std::uint32_t(share * plan_.wholeIterations), 1u);
   };
@@ -271,32 +314,56 @@ Attempt EllipsoidSearch::wholeFit(double count) const {
   const bool isShort = from && draft_ && from == &*draft_;
   if (goal_.bytes && (!from || isShort)) {
     if (!saturates_) options.iterations = iterationsOf(kTuning.sizedShare);
-    return attempted(options);
+    return attempted(job_, options);
   }
-  if (!from) return attempted(options);
+  if (!from) return attempted(job_, options);
   options.iterations = iterationsOf(isShort ? kTuning.continuedShare : kTuning.continuedWholeShare);
   const bool grows = kGrownFrom * double(*options.count) >= double(from->count());
   const StoredGrid fewer =
       grows ? StoredGrid{} : heaviest(from->grid, std::size_t(kGrownFrom * double(*options.count)));
   options.start = grows ? &from->grid.field : &fewer.field;
-  return attempted(options);
+  return attempted(job_, options);
 }
 
 CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions target) const {
   return compactedTo(job_, attempt.grid, attempt.fit, target);
 }
 
-Conversion EllipsoidSearch::stored(Attempt attempt, const CompactOptions& target) const {
-  Conversion conversion = storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), target);
-  conversion.decisions.bothSigns = bothSigns_;
-  return conversion;
+/// The smallest conversion of an attempt with the PSNR of the goal. Rate control knows the error over the
+/// box alone. A judge's PSNR loses about as many dB, which is measured.
+Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) const {
+  const auto stored = [&](FitResult fit, StoredGrid grid, const CompactOptions& target) {
+    Conversion conversion = storedAs(job_, std::move(fit), std::move(grid), target);
+    conversion.decisions.bothSigns = bothSigns_;
+    return conversion;
+  };
+  if (!job_.judge || !compact_)
+    return stored(std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
+  RootSearch search({-kMostRoundingLoss, -kLeastLoss, kNarrowestLoss},
+                    *goal_.psnr + 0.5 * kPsnrSpare, rounding_.factor,
+                    -(attempt.psnr - *goal_.psnr) / rounding_.factor);
+  std::optional<Conversion> best;
+  double bestOver = 0.0;
+  for (int trial = 0; trial < kMostRoundings && !search.ended(); ++trial) {
+    Conversion made = stored(attempt.fit, attempt.grid, {.loss = -search.next()});
+    const double psnr = psnrOf(job_, made), over = psnr - *goal_.psnr;
+    const bool isBetter =
+        !best || (bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver);
+    if (isBetter) best = std::move(made), bestOver = over;
+    if ((over >= 0.0 && over <= kPsnrSpare) || attempt.cancelled()) break;
+    search.learn(psnr);
+  }
+  return std::move(*best);
+}
+
+/// The quality that an attempt has after rounding.
+double EllipsoidSearch::qualityOf(const Attempt& attempt, const CompactResult& rounded) const {
+  return job_.judge ? psnrOf(job_, rounded.grid) : attempt.psnr - rounded.loss;
 }
 
 // ---- Short fits
 
-double EllipsoidSearch::aim() const {
-  return *goal_.psnr + (compact_ ? kCompactMargin : kFloat32Margin).aim;
-}
+double EllipsoidSearch::aim() const { return *goal_.psnr + margin_.aim; }
 
 double EllipsoidSearch::capped(double count) const {
   return std::clamp(count, 1.0, double(std::max<std::uint64_t>(maxCount_, 1)));
@@ -311,10 +378,10 @@ double EllipsoidSearch::forecastCount(double psnr) const {
 /// A short fit whose number of ellipsoids is near the one that the PSNR needs. The first guess can be
 /// far from it, where signs and prices differ.
 void EllipsoidSearch::draftNearPsnr() {
-  double guess = double(activeVoxelCount(job_.input.source)) / kTuning.voxelsOfFirstGuess;
+  double guess = firstCount(job_);
   // Where ellipsoids win, they usually take about half of the bytes.
   if (goal_.below) guess = std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach);
-  draft_ = shortFit(capped(std::min(guess, kMostOfFirstDraft)));
+  draft_ = shortFit(capped(guess));
   for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
     if (draft_->cancelled() || !mayStayBelow(goal_.below.value_or(UINT64_MAX))) return;
     const double count = capped(kGrownFrom * forecastCount(aim()));
@@ -336,7 +403,7 @@ void EllipsoidSearch::draftNearPsnr() {
 /// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each other
 /// need more bits, so that the PSNR alone would not do.
 double EllipsoidSearch::qualityForBytes(const Attempt& attempt) const {
-  const CompactResult compact = compacted(attempt, {.loss = kTuning.usualLoss, .quick = true});
+  const CompactResult compact = compacted(attempt, {.loss = rounding_.usualLoss, .quick = true});
   const double doublings = std::log2(double(std::max<std::uint64_t>(compact.bytes, 1)));
   return attempt.psnr - compact.loss - kDbPerDoubling * doublings;
 }
@@ -367,7 +434,7 @@ void EllipsoidSearch::decideSigns() {
 void EllipsoidSearch::forecast() {
   if (draft_->cancelled() || !compact_) return;
   const bool isQuick = goal_.psnr.has_value();
-  const CompactResult compact = compacted(*draft_, {.loss = kTuning.usualLoss, .quick = isQuick});
+  const CompactResult compact = compacted(*draft_, {.loss = rounding_.usualLoss, .quick = isQuick});
   price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
   const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
   besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
@@ -390,14 +457,15 @@ void EllipsoidSearch::draft(const CancelToken* cancel) {
   if (goal_.psnr)
     draftNearPsnr();
   else
-    draft_ = shortFit(kGrownFrom * double(*goal_.bytes) / kTuning.usualBytesEach);
+    draft_ = shortFit(firstCount(job_));
   if (!goal_.below || mayStayBelow(*goal_.below)) decideSigns();
   forecast();
   options_.fit.cancel = own;
 }
 
 double EllipsoidSearch::expectedPsnr() const {
-  return draft_->psnr + (draft_->cancelled() ? 0.0 : behind_) - kTuning.usualLoss;
+  return draft_->psnr + (draft_->cancelled() ? 0.0 : behind_) -
+         rounding_.usualLoss * rounding_.factor;
 }
 
 bool EllipsoidSearch::mayReach(double psnr) const {
@@ -417,7 +485,6 @@ std::optional<Conversion> EllipsoidSearch::run() { return goal_.psnr ? runToPsnr
 
 /// The number of ellipsoids grows with their PSNR: a root search over its logarithm.
 std::optional<Conversion> EllipsoidSearch::runToPsnr() {
-  const Margin margin = compact_ ? kCompactMargin : kFloat32Margin;
   RootSearch search({0.0, std::log2(capped(HUGE_VAL)), std::log2(kMinGrowth)}, aim(), slope_,
                     std::log2(capped(forecastCount(aim()))));
   while (!draft_->cancelled() && int(attempts_.size()) < plan_.wholeFits) {
@@ -434,36 +501,36 @@ std::optional<Conversion> EllipsoidSearch::runToPsnr() {
     const Attempt& last = attempts_.back();
     const double over = last.psnr - *goal_.psnr;
     const bool allThereIs = last.fit.deviceFull || double(last.asked) >= capped(HUGE_VAL);
-    if (last.cancelled() || (over >= margin.min && over <= margin.max)) break;
-    if (over < margin.min && allThereIs) break;
+    if (last.cancelled() || (over >= margin_.min && over <= margin_.max)) break;
+    if (over < margin_.min && allThereIs) break;
     search.learn(last.psnr);
   }
   if (attempts_.empty()) {
     draft_->fit.end = FitEnd::kCancelled;
-    return stored(std::move(*draft_), {.psnr = goal_.psnr});
+    return storedForPsnr(std::move(*draft_));
   }
   return smallestOrBest();
 }
 
 /// The smallest conversion of the attempts that reach the PSNR; otherwise the best one, as missed.
 Conversion EllipsoidSearch::smallestOrBest() {
-  const Margin margin = compact_ ? kCompactMargin : kFloat32Margin;
   const auto worse = [](const Attempt& a, const Attempt& b) { return a.psnr < b.psnr; };
   std::ranges::sort(attempts_, worse);
   const auto reached =
       std::ranges::find_if(attempts_, [&](const Attempt& a) { return a.psnr > *goal_.psnr; });
   if (reached == attempts_.end()) {
     if (!attempts_.back().cancelled()) attempts_.back().fit.end = FitEnd::kPsnrMissed;
-    return stored(std::move(attempts_.back()), {.psnr = goal_.psnr});
+    return storedForPsnr(std::move(attempts_.back()));
   }
   // Those near the aim may be the smallest; others are larger than the one with the lowest PSNR.
   std::optional<Conversion> smallest;
   std::uint64_t fewest = 0;
   for (auto a = reached; a != attempts_.end(); ++a) {
-    const bool isNear = a->psnr - *goal_.psnr >= margin.min && a->psnr - *goal_.psnr <= margin.max;
+    const bool isNear =
+        a->psnr - *goal_.psnr >= margin_.min && a->psnr - *goal_.psnr <= margin_.max;
     if (smallest && !isNear) break;
     if (!a->cancelled()) a->fit.end = FitEnd::kPsnrReached;
-    Conversion now = stored(std::move(*a), {.psnr = goal_.psnr});
+    Conversion now = storedForPsnr(std::move(*a));
     const std::uint64_t bytes = bytesOfEllipsoids(now.grid);
     if (!smallest || bytes < fewest) smallest = std::move(now), fewest = bytes;
   }
@@ -495,7 +562,7 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
   std::optional<Conversion> best;
   double quality = 0.0, each = price_;
   const auto take = [&](Attempt attempt, CompactResult now) {
-    quality = attempt.psnr - now.loss;
+    quality = qualityOf(attempt, now);
     best = conversionOf(std::move(attempt.fit), std::move(now));
     best->decisions.bothSigns = bothSigns_;
   };
@@ -509,14 +576,14 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
     }
     auto now = filled(*attempt);
     if (!now) break;
-    const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= kTuning.mostLoss;
+    const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= rounding_.mostLoss;
     const bool isLast = attempt->cancelled() || (isSmall && isGood) || attempt->asked == 1;
     if (!isLast)
       each = std::max(
-          double(compacted(*attempt, {.loss = kTuning.usualLoss}).bytes) / countOf(*attempt),
+          double(compacted(*attempt, {.loss = rounding_.usualLoss}).bytes) / countOf(*attempt),
           kMoreEach * each);
     attempts_.assign(1, *attempt);  // the next fit may continue it
-    if (isSmall && (!best || attempt->psnr - now->loss > quality))
+    if (isSmall && (!best || qualityOf(*attempt, *now) > quality))
       take(std::move(*attempt), std::move(*now));
     if (isLast) break;
   }

@@ -13,14 +13,18 @@ namespace esvr::encode {
 
 /// A fit, and its grid in float32.
 struct Attempt {
-  FitResult fit;          ///< its field was moved to the grid
-  StoredGrid grid;        ///< grid in float32
-  double psnr = 0.0;      ///< dB over the box
-  std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
+  FitResult fit;                    ///< its field was moved to the grid
+  StoredGrid grid;                  ///< grid in float32
+  double psnr = 0.0;                ///< quality, dB
+  std::size_t asked = 0;            ///< wanted number of ellipsoids; the grid may have fewer
+  std::optional<bool> bothSigns{};  ///< FitOptions::bothSigns
 
   [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
   [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
 };
+
+/// The first short fit of a search for a PSNR or a size.
+[[nodiscard]] Attempt shortFitOf(const Job& job);
 
 /// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
 /// are found by value, and the end of the fit becomes kCancelled.
@@ -38,6 +42,12 @@ struct Attempt {
 
 /// bytesAdded() of a grid of ellipsoids, which takes little time, so that nothing cancels it.
 [[nodiscard]] std::uint64_t bytesOfEllipsoids(const StoredGrid& grid);
+
+/// dB by which the float32 grid should exceed a PSNR: the best value, and the limits within which the size
+/// hardly differs.
+struct Margin {
+  double aim, min, max;
+};
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
 /// Plan::wholeFits whole fits are made (for a size up to five, if the ellipsoids of none before keep to
@@ -84,13 +94,12 @@ class EllipsoidSearch {
   [[nodiscard]] bool drafted() const { return draft_ && !draft_->cancelled(); }
 
  private:
-  [[nodiscard]] Attempt attempted(const FitOptions& options) const;
   [[nodiscard]] Attempt shortFit(double count) const;
   [[nodiscard]] Attempt wholeFit(double count) const;
   [[nodiscard]] const Attempt* startFor(double count) const;
-  [[nodiscard]] FitOptions optionsFor(double count, std::uint32_t iterations) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
-  [[nodiscard]] Conversion stored(Attempt attempt, const CompactOptions& target) const;
+  [[nodiscard]] Conversion storedForPsnr(Attempt attempt) const;
+  [[nodiscard]] double qualityOf(const Attempt& attempt, const CompactResult& rounded) const;
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void draftNearPsnr();
   void decideSigns();
@@ -109,7 +118,9 @@ class EllipsoidSearch {
   Goal goal_;
   Plan plan_;
   bool compact_, saturates_;
-  double behind_;  ///< PSNR of a whole fit less that of a short one, dB
+  Rounding rounding_;
+  Margin margin_;
+  double behind_;  ///< quality of a whole fit less that of a short one, dB
   double slope_ = kDbPerDoubling;
   std::uint64_t maxCount_;
   Decision bothSigns_;

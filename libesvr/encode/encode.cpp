@@ -15,6 +15,7 @@
 #include "core/add_seconds.h"
 #include "encode/ellipsoids.h"
 #include "encode/signs.h"
+#include "encode/tone.h"
 #include "encode/tuning.h"
 #include "encode/voxels.h"
 #include "esvr/error.h"
@@ -273,18 +274,6 @@ Conversion fitOrExact(const Job& job) {
 
 // ---- Goals
 
-/// The PSNR over the box at which the same sum of squares has a PSNR over the active voxels.
-double boxPsnrFor(const Job& job, double psnrActive) {
-  const SparseVolume& source = job.input.source;
-  const Box box = job.options.fit.box.value_or(activeBox(source));
-  std::uint64_t active = 0;
-  for (std::size_t b = 0; b < source.brickCount(); ++b)
-    for (int v = 0; v < kBrickVoxels; ++v)
-      active += source.active[b].test(v) && box.contains(source.brickCorner(b) + voxelLocal(v));
-  const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
-  return psnrActive + 10.0 * std::log10(std::max(share, 1.0));
-}
-
 double absoluteBound(const BoundGoal& goal, const SparseVolume& source) {
   return goal.relative ? goal.bound * valueRangeOf(source) : goal.bound;
 }
@@ -306,9 +295,12 @@ class Converter {
     ConvertOptions options = job_.options;
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
-    const Job job{job_.input, options};
-    return Choice(job, {.psnr = boxPsnrFor(job, presetPsnr(options.fit.preset))})
-        .forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
+    const Job job{job_.input, options, job_.judge, job_.firstFit};
+    const double psnr =
+        Judge::seesPictures({job.input.descriptor, valuesOf(job)}, options)
+            ? presetPicturePsnr(options.fit.preset)
+            : presetPsnr(options.fit.preset) + boxGain(job.input.source, options.fit.box);
+    return Choice(job, {.psnr = psnr}).forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
@@ -316,6 +308,9 @@ class Converter {
     return Choice(job_, {.bytes = goal.bytes}).forSize();
   }
   Conversion operator()(const PsnrGoal& goal) const {
+    return Choice(job_, {.psnr = goal.psnr}).forPsnr(1.0, kSmallForPsnr);
+  }
+  Conversion operator()(const PictureGoal& goal) const {
     return Choice(job_, {.psnr = goal.psnr}).forPsnr(1.0, kSmallForPsnr);
   }
   Conversion operator()(const BoundGoal& goal) const {
@@ -447,7 +442,8 @@ std::optional<std::uint64_t> smallerExactBytes(const Job& job, const StoredGrid&
 /// bytes, so that no fit is made for comparison.
 bool keepsVoxels(const ConvertOptions& options) {
   const bool hasQuality = std::holds_alternative<PresetGoal>(options.goal) ||
-                          std::holds_alternative<PsnrGoal>(options.goal);
+                          std::holds_alternative<PsnrGoal>(options.goal) ||
+                          std::holds_alternative<PictureGoal>(options.goal);
   return options.previous && options.previous->voxels && hasQuality &&
          options.representation == Representation::kAuto &&
          options.storage.form == Storage::kCompact;
@@ -517,6 +513,39 @@ Conversion convertNear(const ConvertInput& given, const ConvertOptions& options,
   return conversion;
 }
 
+/// Converts a volume that is judged by pictures, or by the values of its tones.
+Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
+                         const ToneChoice& choice) {
+  const ToneCurve tone = choice.tone;
+  const Judge judge(given, options, tone);
+  GridDescriptor descriptor = given.descriptor;
+  SparseVolume tones;
+  StoredGrid before;  // the previous frame, as a grid of tones
+  const StoredGrid* const previous = options.previous;
+  if (previous && !(previous->tone == tone)) options.previous = nullptr;
+  if (tone.isOn()) {
+    tones = tonesOf(given.source, tone);
+    descriptor.valueType = ValueType::kFloat;
+    options.fit.peak.reset();
+    if (options.previous) {
+      before = *previous;
+      before.tone = {};
+      options.previous = &before;
+    }
+    if (auto* size = std::get_if<SizeGoal>(&options.goal))
+      size->bytes -= std::min<std::uint64_t>(size->bytes, sizeof tone.scale);
+  }
+  const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
+  const Job job{input, options, &judge, choice.fit ? &*choice.fit : nullptr};
+  Conversion conversion = std::visit(Converter(job), options.goal);
+  conversion.smallerExactBytes =
+      unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
+  if (tone.isOn()) setTone(given, tone, conversion.grid);
+  conversion.byPictures = Judge::seesPictures(given, options);
+  conversion.grid = throughTheFormat(std::move(conversion.grid), previous, memoryOf(given.source));
+  return conversion;
+}
+
 // ---- Conversions
 
 Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
@@ -534,6 +563,11 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
   const auto convertTo = [](const Job& job) {
     return std::visit(Converter(job), job.options.goal);
   };
+  if (std::holds_alternative<PictureGoal>(own.goal) && !Judge::seesPictures(input, own))
+    own.goal = PresetGoal{};
+  const ToneChoice choice = chooseTone(input, own);
+  if (choice.tone.isOn() || Judge::seesPictures(input, own))
+    return convertJudged(input, own, choice);
   const Job job{input, own};
   Conversion conversion = own.fit.narrowBand ? convertNarrowBand(job, convertTo) : convertTo(job);
   conversion.smallerExactBytes =
@@ -573,6 +607,18 @@ PaperConversion convertedByPaper(const ConvertInput& input, const PaperFitOption
 }  // namespace esvr::encode
 
 namespace esvr {
+
+double presetPicturePsnr(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return 30.0;
+    case Preset::kHigh:
+      return 46.0;
+    case Preset::kStandard:
+      break;
+  }
+  return 38.0;
+}
 
 double presetPsnr(Preset preset) {
   switch (preset) {

@@ -10,10 +10,15 @@
 
 namespace esvr::encode {
 
+class Judge;
+struct Attempt;
+
 /// The input and the options of a conversion, which a job does not own.
 struct Job {
-  const ConvertInput& input;
+  const ConvertInput& input;  ///< has the tones of the values if there is a tone curve
   const ConvertOptions& options;
+  const Judge* judge = nullptr;       ///< null: quality is the PSNR over the box
+  const Attempt* firstFit = nullptr;  ///< a short fit that a search need not repeat; null: none
 };
 
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.
@@ -28,8 +33,18 @@ template <class Work>
   return {};
 }
 
-/// PSNR of a volume or of a decoded grid over the box, dB.
-[[nodiscard]] double psnrOf(const Job& job, const SparseVolume& volume);
+/// The values of the input, which are not those of a job with a tone curve.
+[[nodiscard]] const SparseVolume& valuesOf(const Job& job);
+
+/// dB that the PSNR over the box of a volume is above that over the active voxels in the box, if all errors
+/// are at these.
+[[nodiscard]] double boxGain(const SparseVolume& volume, const std::optional<Box>& box);
+
+/// True if the quality of the job is what is seen.
+[[nodiscard]] bool seesPictures(const Job& job);
+
+/// Quality of a volume or of a decoded grid, dB: by the job's judge (tone.h), or its PSNR over the box.
+[[nodiscard]] double psnrOf(const Job& job, SparseVolume volume);
 [[nodiscard]] double psnrOf(const Job& job, const StoredGrid& grid);
 
 /// The representation of a job. Float32 storage is a form of ellipsoids.

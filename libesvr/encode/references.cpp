@@ -193,6 +193,7 @@ StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
                         const VoxelReference& reference) {
   StoredGrid expected;
   expected.descriptor = grids[grid].descriptor;
+  expected.tone = grids[grid].tone;
   if (!reference.grid) {
     expected.voxels = partOf(*grids[grid].voxels, {});
     return expected;

@@ -8,6 +8,12 @@
 
 namespace esvr::encode {
 
+/// The loss by quantising, dB of PSNR over the box, at which further bytes gain as much in more ellipsoids as in
+/// more bits, the one above which fewer ellipsoids are better, and the loss of quality for each dB of it.
+struct Rounding {
+  double usualLoss, mostLoss, factor;
+};
+
 struct Tuning {
   // ---- How ellipsoids grow with their number
 
@@ -20,6 +26,8 @@ struct Tuning {
   /// PSNR of a whole fit less that of a short one, dB: smoke1 and wdas have 1.3 to 1.6. Where many
   /// voxels saturate it is 5 to 6 (dragon, aneurism), since a clamped voxel has no gradient.
   double shortFitBehind = 1.6, shortFitBehindSaturated = 5.0;
+  /// The same for what is seen.
+  double seenShortFitBehind = 0.8;
   /// Share of the active voxels with an extreme value from which on a volume saturates.
   double saturatedShare = 0.05;
   /// dB by which a whole fit may exceed its forecast (dragon, neuron_rp140212), and the steepest
@@ -49,9 +57,17 @@ struct Tuning {
 
   // ---- Ellipsoids or more bits
 
-  /// Loss of PSNR by quantising, dB, at which further bytes gain as much in more ellipsoids as in
-  /// more bits, and above which fewer ellipsoids are better (Lab, "More ellipsoids or more bits").
-  double usualLoss = 0.9, mostLoss = 2.5;
+  /// For the PSNR over the box (Lab, "More ellipsoids or more bits"), and for what is seen: errors of
+  /// intensities add up along a column of voxels.
+  Rounding rounding{0.9, 2.5, 1.0}, seenRounding{0.5, 1.2, 1.65};
+
+  // ---- What is seen
+
+  /// dB by which the PSNR over the active voxels may be lower than that of the transmittance.
+  double picturesAboveValues = 4.0;
+  /// The ninth decile of the active values relative to their median from which on a tone curve is tried, and
+  /// the dB by which it must be better.
+  double leastToneRange = 3.0, toneGain = 0.1;
 
   // ---- Voxels
 

@@ -71,8 +71,7 @@ namespace {
 /// so that it is coded once.
 constexpr std::size_t kSampledFrom = 4;
 
-SparseVolume sampleFor(const Job& job, std::size_t bricks) {
-  const SparseVolume& source = job.input.source;
+SparseVolume sampleFor(const Job& job, const SparseVolume& source, std::size_t bricks) {
   const bool isLarge = source.brickCount() >= kSampledFrom * bricks;
   // A frame is predicted from all bricks of the frame before.
   if (!isLarge || job.options.previous) return {};
@@ -146,6 +145,7 @@ constexpr double kNarrowest = 0.002;               // a bound that differs by 0.
 constexpr double kDbPerOctave = 6.02;              // gain of PSNR by half the bound
 constexpr double kDoublingsPerOctave = 0.5;        // usual growth of the bytes by half the bound
 constexpr double kThriftOctaves = 0.08;            // make up for the loss by a price
+constexpr double kOctaveOfSize = 6.0;              // a usual one
 
 // Trials of a search. Each nearest one takes a pass over the voxels, and each thrifty one as long as
 // coding them.
@@ -166,11 +166,11 @@ RootRange octaves() { return {kCoarsest, kFinest, kNarrowest}; }
 }  // namespace
 
 Candidate estimateExactVoxels(const Job& job) {
-  const SparseVolume& source = job.input.source;
+  const SparseVolume& source = valuesOf(job);
   std::uint64_t bytes = 0;
   bool isSampled = false;
   const double seconds = secondsOf([&] {
-    const SparseVolume sample = sampleFor(job, kTuning.sampleBricks);
+    const SparseVolume sample = sampleFor(job, source, kTuning.sampleBricks);
     isSampled = sample.brickCount() > 0;
     bytes = exactBytesOf(isSampled ? sample : source, source) + bytesBeside(job);
   });
@@ -180,8 +180,8 @@ Candidate estimateExactVoxels(const Job& job) {
 VoxelCandidate exactVoxels(const Job& job) {
   VoxelCandidate made;
   made.seconds = secondsOf([&] {
-    const auto& [descriptor, source] = job.input;
-    made.grid = makeStoredVoxels(descriptor, source, exactLayer(source));
+    const SparseVolume& source = valuesOf(job);
+    made.grid = makeStoredVoxels(job.input.descriptor, source, exactLayer(source));
     made.bytes = bytesInFrame(made.grid, job.options.previous);
     made.psnr = std::numeric_limits<double>::infinity();
   });
@@ -195,7 +195,7 @@ VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
       goal_(goal),
       box_(job.options.fit.box.value_or(activeBox(job.input.source))),
       peak_(job.options.fit.peak ? *job.options.fit.peak : peakOf(job.input.source)),
-      sample_(sampleFor(job, goal.sampleBricks)),
+      sample_(sampleFor(job, job.input.source, goal.sampleBricks)),
       tryOn_(sample_.brickCount() > 0 ? sample_ : job.input.source),
       share_(double(tryOn_.brickCount()) / double(job.input.source.brickCount())),
       range_(spanOf(job.input.source).length()),
@@ -239,9 +239,10 @@ double VoxelSearch::shareOf(const SparseVolume& volume) const {
 
 double VoxelSearch::psnrOn(const SparseVolume& volume, const VoxelLayer& layer) const {
   SparseVolume made = volumeOf(layer);
+  if (job_.judge && &volume == &job_.input.source) return (*job_.judge)(std::move(made));
   if (decodedValues(job_) == DecodedValues::kHalfs) roundToHalfs(made);
   return psnrOverBox(volume, made, {.box = box_, .peak = peak_}) +
-         10.0 * std::log10(shareOf(volume));
+         10.0 * std::log10(shareOf(volume)) + judged_;
 }
 
 VoxelSearch::Tried VoxelSearch::tried(const SparseVolume& volume, const Setting& setting) const {
@@ -339,8 +340,7 @@ void VoxelSearch::tryForPsnr() {
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
   if (bits >= leastBitsOfExact(exactLayer(tryOn_).form))
-    exact_ = job_.options.previous ? exactVoxels(job_).bytes
-                                   : exactBytesOf(tryOn_, job_.input.source) + besides_;
+    exact_ = job_.options.previous ? exactVoxels(job_).bytes : exactBytes();
 }
 
 /// Takes the lattice with the plateau where it is better, and records the decision.
@@ -415,7 +415,7 @@ bool VoxelSearch::mayReach(double psnr) {
 }
 
 void VoxelSearch::tryForSize() {
-  exact_ = exactBytesOf(tryOn_, job_.input.source) + besides_;
+  exact_ = exactBytes();
   if (!(range_ > 0.0)) return;
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const Setting first{2.0 + 8.0 * double(*goal_.bytes) / active, price()};
@@ -434,11 +434,38 @@ void VoxelSearch::tryForSize() {
 
 // ---- The result
 
+/// About the bytes of a grid of exact voxels.
+std::uint64_t VoxelSearch::exactBytes() const {
+  const SparseVolume& values = valuesOf(job_);
+  const bool isOwn = &values == &job_.input.source;
+  const SparseVolume sample =
+      isOwn || !isSampled() ? SparseVolume{} : sampleOf(values, goal_.sampleBricks);
+  const SparseVolume& on = isOwn ? tryOn_ : isSampled() ? sample : values;
+  return exactBytesOf(on, values) + besides_;
+}
+
+/// A judge sees the volume as a whole. By how much its quality exceeds the PSNR of a sample is found with
+/// the nearest codes of the whole volume, at a bound that has about the quality of the goal.
+void VoxelSearch::matchJudge() {
+  if (!job_.judge || !isSampled() || !(range_ > 0.0)) return;
+  const SparseVolume& source = job_.input.source;
+  double octave = goal_.psnr ? *goal_.psnr / kDbPerOctave - 1.0 : kOctaveOfSize;
+  for (int n = 0; n < 2; ++n) {
+    const VoxelLayer layer = layerOf(source, {.octave = octave});
+    const double quality = psnrOn(source, layer);
+    judged_ = quality - psnrOverBox(source, volumeOf(layer), {.box = box_, .peak = peak_});
+    if (!std::isfinite(judged_)) judged_ = 0.0;
+    if (!goal_.psnr || !std::isfinite(quality)) break;
+    octave = std::clamp(octave + (*goal_.psnr - quality) / kDbPerOctave, kCoarsest, kFinest);
+  }
+}
+
 void VoxelSearch::trySettings() {
   if (std::exchange(hasTried_, true)) return;
   seconds_ += secondsOf([&] {
     // On the whole volume, the first voxels that meet the goal are worth keeping.
     const auto end = unlessCancelled([&]() -> std::optional<bool> {
+      matchJudge();
       goal_.psnr ? tryForPsnr() : tryForSize();
       return true;
     });

@@ -14,7 +14,7 @@ namespace esvr::encode {
 struct VoxelCandidate {
   StoredGrid grid;
   std::uint64_t bytes = 0;  ///< bytes that it adds to the file or frame
-  double psnr = 0.0;        ///< dB over the box; +inf if the voxels are exact
+  double psnr = 0.0;        ///< quality, dB; +inf if the voxels are exact
   double seconds = 0.0;     ///< wall-clock seconds of the whole search
   Decision plateau;         ///< whether the lattice contains the most frequent value
 };
@@ -71,7 +71,7 @@ class VoxelSearch {
   struct Tried {
     Setting setting;
     VoxelLayer layer;
-    double psnr = 0.0;  ///< dB over the box; of a sample, that of the volume that it stands for
+    double psnr = 0.0;        ///< quality, dB; of a sample, that of the volume that it stands for
     std::uint64_t bytes = 0;  ///< as bytesOf(); 0 if they were not counted
   };
 
@@ -99,6 +99,8 @@ class VoxelSearch {
   [[nodiscard]] std::optional<Tried> withPlateau(const SparseVolume& volume, Setting setting) const;
   [[nodiscard]] std::optional<VoxelCandidate> finished();
 
+  [[nodiscard]] std::uint64_t exactBytes() const;
+  void matchJudge();
   void trySettings();
   void tryForPsnr();
   void tryForSize();
@@ -111,7 +113,8 @@ class VoxelSearch {
   SparseVolume sample_;        ///< empty if the sample is the whole volume
   const SparseVolume& tryOn_;  ///< the sample, or the volume
   double share_ = 1.0;         ///< bricks of the sample per brick of the volume
-  double range_ = 0.0;         ///< span of the values; 0 for a volume of one value
+  double judged_ = 0.0;  ///< quality by the judge less the PSNR over the box, dB, for a sample
+  double range_ = 0.0;   ///< span of the values; 0 for a volume of one value
   std::uint64_t besides_ = 0;  ///< bytes of a grid without its voxels
   Plateau plateau_;
   bool hasTried_ = false;

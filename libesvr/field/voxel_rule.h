@@ -10,6 +10,7 @@
 
 #include "esvr/ellipsoids.h"
 #include "esvr/field.h"
+#include "esvr/tone.h"
 #include "esvr/volume.h"
 
 namespace esvr {
@@ -20,10 +21,12 @@ struct VoxelRule {
   float high = std::numeric_limits<float>::infinity();  ///< larger sums are clamped to this
   float threshold = 0.0f;
   bool narrowBand = false;
+  ToneCurve tone{};  ///< sums are tones; the other members are values
 
-  /// The clamped sum, which is the value of an active voxel.
+  /// The clamped value of a sum, which is the value of an active voxel.
   [[nodiscard]] ESVR_HD float settled(float sum) const {
-    return sum < low ? low : (high < sum ? high : sum);
+    const float value = tone.value(sum);
+    return value < low ? low : (high < value ? high : value);
   }
   /// The activity of a settled value. A voxel is active if it is above the threshold.
   [[nodiscard]] ESVR_HD float activity(float settled) const {
@@ -47,6 +50,7 @@ struct VoxelRule {
   if (options.range) rule.low = options.range->min, rule.high = options.range->max;
   rule.threshold = options.threshold;
   rule.narrowBand = options.narrowBand;
+  rule.tone = options.tone;
   return rule;
 }
 

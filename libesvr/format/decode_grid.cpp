@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid.h"
@@ -20,7 +21,7 @@ namespace esvr {
 // ---- The rule
 
 RevoxeliseOptions voxelRule(const StoredGrid& grid) {
-  RevoxeliseOptions options{.threshold = grid.activeThreshold};
+  RevoxeliseOptions options{.tone = grid.tone, .threshold = grid.activeThreshold};
   const float background = grid.field.background;
   if (grid.withinRange)  // the range of all values of the source, of active and inactive voxels
     options.range =
@@ -193,10 +194,16 @@ void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
   dropInactiveBricks(volume);
 }
 
-/// True if the decoded values are halfs, as those of the source. Exact voxels are the source's own.
-bool isRoundedToHalfs(const StoredGrid& grid) {
-  return grid.descriptor.valueType == ValueType::kHalf &&
-         (!grid.voxels || grid.voxels->form == VoxelForm::kQuantised);
+/// Turns the tones of voxels into values, within the range of the grid.
+void applyTone(const VoxelRule& rule, SparseVolume& volume) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    for (float& value : volume.brickValues(b)) value = rule.settled(value);
+  });
+}
+
+/// True if the values of a grid are the source's own.
+bool isExact(const StoredGrid& grid) {
+  return grid.voxels && grid.voxels->form != VoxelForm::kQuantised;
 }
 
 }  // namespace
@@ -212,9 +219,10 @@ SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
     requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
                         "grid '" + shownName(grid.descriptor.name) + "'");
   SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+  if (grid.voxels && grid.tone.isOn() && !isExact(grid)) applyTone(format::ruleOf(grid), volume);
   if (grid.voxels && options.box) clip(*options.box, format::ruleOf(grid), volume);
   if (grid.farBackground) setBackground(float(grid.descriptor.background), volume);
-  if (isRoundedToHalfs(grid)) roundToHalfs(volume);
+  if (grid.descriptor.valueType == ValueType::kHalf && !isExact(grid)) roundToHalfs(volume);
   return volume;
 }
 

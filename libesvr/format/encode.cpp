@@ -301,11 +301,11 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   // Records come first, so that one read at the beginning of the file is enough to list it.
   SectionWriter out;
   out.setLayout(file.layout);
-  constexpr std::uint16_t kTopologiesOfBoxes = 5;  // far backgrounds and box voxels
+  constexpr std::uint16_t kFactsOfVoxels = 5;  // far backgrounds, box voxels and tone curves
   if (std::ranges::any_of(file.grids, [](const StoredGrid& grid) {
-        return grid.farBackground || !grid.boxVoxels.empty();
+        return grid.farBackground || !grid.boxVoxels.empty() || grid.tone.isOn();
       }))
-    out.requireVersion(kTopologiesOfBoxes);
+    out.requireVersion(kFactsOfVoxels);
   if (!inherited.metadata) addFileMetadata(out, file);
   addRecords(out, grids, differences);
   for (std::uint32_t g = 0; g < grids.size(); ++g)

@@ -85,23 +85,25 @@ GridDescriptor getDescriptor(ByteReader& in) {
 constexpr std::uint8_t kTopologies = 4;     // the numbers of topologies are below this
 constexpr std::uint8_t kFarBackground = 4;  // StoredGrid::farBackground
 constexpr std::uint8_t kHasBoxVoxels = 8;   // the record has StoredGrid::boxVoxels
+constexpr std::uint8_t kHasTone = 16;       // the record has StoredGrid::tone
 
 void putTopology(ByteWriter& out, const StoredGrid& grid) {
   unsigned topology = unsigned(grid.topology);
   if (grid.farBackground) topology += kFarBackground;
   if (!grid.boxVoxels.empty()) topology += kHasBoxVoxels;
+  if (grid.tone.isOn()) topology += kHasTone;
   out.put(std::uint8_t(topology));
 }
 
-/// \return whether the record has box voxels
-bool getTopology(ByteReader& in, StoredGrid& grid) {
+/// \return the byte, which says what else the record has
+std::uint8_t getTopology(ByteReader& in, StoredGrid& grid) {
   const auto topology = in.get<std::uint8_t>();
   const bool isKnown =
-      topology < 2 * kHasBoxVoxels && topology % kTopologies <= std::uint8_t(TopologyKind::kMask);
+      topology < 2 * kHasTone && topology % kTopologies <= std::uint8_t(TopologyKind::kMask);
   if (!isKnown) in.fail("unknown topology " + std::to_string(topology));
   grid.topology = TopologyKind(topology % kTopologies);
   grid.farBackground = (topology & kFarBackground) != 0;
-  return (topology & kHasBoxVoxels) != 0;
+  return topology;
 }
 
 /// Writes voxels by their distances from the lowest corner of the active box.
@@ -132,16 +134,21 @@ void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
   out.put(grid.activeThreshold);
   putBox(out, grid.activeBox);
   putBoxVoxels(out, grid);
+  if (grid.tone.isOn()) out.put(grid.tone.scale);
   out.put(grid.activeVoxels);
   out.put(grid.valueMin);
   out.put(grid.valueMax);
 }
 void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
-  const bool hasBoxVoxels = getTopology(in, grid);
+  const std::uint8_t has = getTopology(in, grid);
   grid.withinRange = getBool(in, "mark of a range of values");
   grid.activeThreshold = in.get<float>();
   grid.activeBox = getBox(in);
-  if (hasBoxVoxels) grid.boxVoxels = getBoxVoxels(in, grid.activeBox);
+  if (has & kHasBoxVoxels) grid.boxVoxels = getBoxVoxels(in, grid.activeBox);
+  if (has & kHasTone) {
+    grid.tone.scale = in.get<float>();
+    if (!grid.tone.isOn()) in.fail("the scale of its tone curve is not above 0");
+  }
   grid.activeVoxels = in.get<std::uint64_t>();
   grid.valueMin = in.get<float>();
   grid.valueMax = in.get<float>();
@@ -454,6 +461,14 @@ const char* boxVoxelFaultOf(const StoredGrid& grid) {
   return isSorted ? nullptr : "its box voxels are not in order";
 }
 
+const char* toneFaultOf(const StoredGrid& grid) {
+  if (grid.tone == ToneCurve{}) return nullptr;
+  if (!finite(grid.tone.scale) || !grid.tone.isOn())
+    return "the scale of its tone curve is not above 0";
+  const bool isPlain = grid.field.background == 0.0f && grid.withinRange && !grid.farBackground;
+  return isPlain ? nullptr : "a tone curve needs a background of 0 and values within their range";
+}
+
 std::optional<Fault> nonFinite(SectionKind section, const char* what,
                                std::span<const std::vector<float>> planes) {
   for (const auto& plane : planes) {
@@ -516,6 +531,7 @@ std::optional<Fault> faultOf(const StoredGrid& grid) {
   if (grid.farBackground && grid.topology != TopologyKind::kMask &&
       grid.topology != TopologyKind::kThreshold)
     return fault("a far background needs a mask or voxels");
+  if (const char* text = toneFaultOf(grid)) return fault(text);
   if (!finite(grid.activeThreshold)) return fault("the threshold is not finite");
   if (const char* text = boxVoxelFaultOf(grid)) return fault(text);
   if (!allFinite({grid.valueMin, grid.valueMax}) || grid.valueMin > grid.valueMax)
@@ -527,6 +543,7 @@ std::optional<Fault> residualFaultOf(const StoredGrid& grid) {
   const auto fault = [](const char* text) { return Fault{SectionKind::kResidual, text}; };
   if (!grid.residual) return std::nullopt;
   if (grid.voxels) return fault("a residual to voxels that are stored themselves");
+  if (grid.tone.isOn()) return fault("a residual to tones");
   if (grid.residual->form != VoxelForm::kQuantised)
     return fault("a residual that is not quantised");
   for (const BrickMask& mask : grid.residual->active)

@@ -186,8 +186,8 @@ std::vector<Coord> someRows(std::span<const Coord> corners, std::size_t axis) {
 }
 
 /// The values of a field in bricks, within limits.
-SparseVolume evaluated(const Field& field, std::span<const Coord> corners,
-                       const ValueRange& limits) {
+SparseVolume evaluated(const Field& field, std::span<const Coord> corners, const ValueRange& limits,
+                       ToneCurve tone) {
   SparseVolume volume;
   if (corners.empty()) return volume;
   Coord first = corners.front();
@@ -198,18 +198,19 @@ SparseVolume evaluated(const Field& field, std::span<const Coord> corners,
   volume.active.resize(corners.size());
   volume.values.resize(corners.size() * kBrickVoxels);
   evaluateBricks(field, corners, volume.values);
-  for (float& value : volume.values) value = std::clamp(value, limits.min, limits.max);
+  for (float& value : volume.values) value = std::clamp(tone.value(value), limits.min, limits.max);
   return volume;
 }
 
-double estimatedMedianDepth(const Field& field, const Box& box, const ValueRange& range) {
+double estimatedMedianDepth(const Field& field, const Box& box, const ValueRange& range,
+                            ToneCurve tone) {
   ValueRange limits = range;
   limits.expand(field.background);
   const std::vector<Coord> corners = reachedBricks(field, box);
   TileDepths depths;
   double largest = 0.0;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const SparseVolume some = evaluated(field, someRows(corners, axis), limits);
+    const SparseVolume some = evaluated(field, someRows(corners, axis), limits, tone);
     Projection made = project(some, TileLayout(some), box, {});
     depths[axis] = std::move(made.depths[axis]);
     largest = std::max(largest, made.largest);
@@ -431,9 +432,10 @@ std::optional<double> medianDepth(const SparseVolume& volume) {
   return median > 0.0 ? std::optional(median) : std::nullopt;
 }
 
-std::optional<double> medianDepth(const Field& field, const Box& box, const ValueRange& range) {
+std::optional<double> medianDepth(const Field& field, const Box& box, const ValueRange& range,
+                                  ToneCurve tone) {
   if (box.empty() || field.background > 0.0f) return std::nullopt;
-  const double median = metrics::estimatedMedianDepth(field, box, range);
+  const double median = metrics::estimatedMedianDepth(field, box, range, tone);
   return median > 0.0 ? std::optional(median) : std::nullopt;
 }
 

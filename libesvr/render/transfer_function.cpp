@@ -489,7 +489,7 @@ LookBasis lookBasis(const StoredGrid& grid, std::uint64_t maxBytes) {
                   .isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet};
   if (grid.descriptor.gridClass != GridClass::kFogVolume || grid.activeBox.empty()) return basis;
   basis.medianDepth = grid.voxels ? medianDepth(decodeGrid(grid, {.maxBytes = maxBytes}))
-                                  : medianDepth(grid.field, grid.activeBox, basis.range);
+                                  : medianDepth(grid.field, grid.activeBox, basis.range, grid.tone);
   return basis;
 }
 

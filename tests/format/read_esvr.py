@@ -113,6 +113,9 @@ def grid(data):
         g["box voxels"] = [tuple(low + r.varint() for low in g["active box"][:3])
                            for _ in range(r.get("B"))]
         assert 1 <= len(g["box voxels"]) <= 6 and sorted(g["box voxels"]) == g["box voxels"]
+    if g["topology"] & 16:
+        g["tone"] = r.get("f")
+        assert 0 < g["tone"] < math.inf and g["within range"] == 1
     for key, form in (("active voxels", "Q"), ("range", "2f"), ("field background", "f"),
                       ("kernel", "B"), ("kappa", "f"), ("epsilon", "f"), ("chunk count", "I")):
         g[key] = r.get(form)

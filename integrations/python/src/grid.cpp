@@ -85,8 +85,11 @@ py::array_t<float> evaluate(const Grid& self, const Places& points) {
   const std::span out(values.mutable_data(), places.size());
   interruptible([&] {
     evaluatePlaces(grid.field, places, out);
-    if (const auto range = voxelRule(grid).range)
-      for (float& value : out) value = std::clamp(value, range->min, range->max);
+    const auto range = voxelRule(grid).range;
+    for (float& value : out) {
+      value = grid.tone.value(value);
+      if (range) value = std::clamp(value, range->min, range->max);
+    }
   });
   return values;
 }
@@ -180,6 +183,12 @@ void addGrid(py::module_& module) {
           [](const Grid& g) { return std::pair(g.grid->valueMin, g.grid->valueMax); },
           "The smallest and the largest active value of the source.")
       .def_property_readonly(
+          "tone",
+          [](const Grid& g) {
+            return g.grid->tone.isOn() ? std::optional(g.grid->tone.scale) : std::nullopt;
+          },
+          "The scale s of the tone curve: values are s sinh(sum / s); None without one.")
+      .def_property_readonly(
           "transform", [](const Grid& g) { return matrixOf(g.grid->descriptor.transform); },
           "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
       .def_property_readonly(
@@ -213,22 +222,25 @@ constexpr Word<Preset> kPresets[] = {
 constexpr Word<Representation> kRepresentations[] = {{"auto", Representation::kAuto},
                                                      {"ellipsoids", Representation::kEllipsoids},
                                                      {"voxels", Representation::kVoxels}};
+constexpr Word<Measure> kMeasures[] = {{"auto", Measure::kAuto}, {"values", Measure::kValues}};
 constexpr Word<Storage> kStorages[] = {{"compact", Storage::kCompact},
                                        {"float32", Storage::kFloat32}};
 
 /// The goals of which one may be given.
 struct Goals {
-  std::optional<double> psnr, maxError;
+  std::optional<double> psnr, picturePsnr, maxError;
   std::optional<std::uint64_t> size;
   std::optional<std::size_t> count;
   bool lossless = false;
 };
 
 Goal goalOf(const Goals& g) {
-  const int given = g.psnr.has_value() + g.maxError.has_value() + g.size.has_value() +
-                    g.count.has_value() + g.lossless;
-  if (given > 1) throw UsageError("psnr, max_error, size, count and lossless exclude each other");
+  const int given = g.psnr.has_value() + g.picturePsnr.has_value() + g.maxError.has_value() +
+                    g.size.has_value() + g.count.has_value() + g.lossless;
+  if (given > 1)
+    throw UsageError("psnr, picture_psnr, max_error, size, count and lossless exclude each other");
   if (g.psnr) return PsnrGoal{*g.psnr};
+  if (g.picturePsnr) return PictureGoal{*g.picturePsnr};
   if (g.maxError) return BoundGoal{.bound = *g.maxError};
   if (g.size) return SizeGoal{*g.size};
   if (g.lossless) return LosslessGoal{};
@@ -306,8 +318,16 @@ constexpr const char* kFitText =
     "Converts a volume to a Grid. One of the goals may be given:\n\n"
     "psnr: the smallest grid of this PSNR over the box, dB; max_error: a bound on the error of\n"
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
-    "lossless: every active voxel bit for bit. The default is the quality of the preset ('draft',\n"
-    "'standard' or 'high'), over the active voxels.\n\n"
+    "lossless: every active voxel bit for bit; picture_psnr: the smallest grid whose "
+    "transmittance\n"
+    "has this PSNR (Metrics.psnr_t50), of a volume that is looked through. The default is the "
+    "quality\n"
+    "of the preset ('draft', 'standard' or 'high').\n\n"
+    "measure: what the quality of a preset and of a size means. 'auto': what is seen of a volume "
+    "that\n"
+    "is looked through, and the PSNR of values otherwise; 'values': the PSNR of values.\n"
+    "tone: the scale of the tone curve; None: it is chosen where the measure is what is seen; 0: "
+    "none.\n"
     "effort: how long the conversion may take, from 1 to 9.\n"
     "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. device:\n"
     "'auto', 'cpu', 'cuda' or 'cuda:N'. progress: is called with the share of the running fit "
@@ -319,13 +339,20 @@ constexpr const char* kFitText =
 void addFit(py::module_& module) {
   module.def(
       "fit",
-      [](const Volume& volume, std::optional<double> psnr, std::optional<double> maxError,
-         std::optional<std::uint64_t> size, std::optional<std::size_t> count, bool lossless,
-         const std::string& preset, int effort, const std::string& representation,
-         const std::string& storage, const std::string& device, std::uint64_t seed,
-         const Progress& progress) {
+      [](const Volume& volume, std::optional<double> psnr, std::optional<double> picturePsnr,
+         std::optional<double> maxError, std::optional<std::uint64_t> size,
+         std::optional<std::size_t> count, bool lossless, const std::string& preset,
+         const std::string& measure, std::optional<float> tone, int effort,
+         const std::string& representation, const std::string& storage, const std::string& device,
+         std::uint64_t seed, const Progress& progress) {
         ConvertOptions options;
-        options.goal = goalOf({psnr, maxError, size, count, lossless});
+        options.goal = goalOf({psnr, picturePsnr, maxError, size, count, lossless});
+        options.measure = valueOf("measure", measure, kMeasures);
+        if (tone && !(std::isfinite(*tone) && *tone >= 0.0f))
+          throw UsageError("tone is a scale above 0, or 0 for no tone curve");
+        if (tone && *tone > 0.0f && (lossless || maxError))
+          throw UsageError("a tone curve has no bound on the error of a voxel");
+        if (tone) options.tone = ToneCurve{*tone};
         options.representation = valueOf("representation", representation, kRepresentations);
         options.storage.form = valueOf("storage", storage, kStorages);
         options.fit.preset = valueOf("preset", preset, kPresets);
@@ -339,8 +366,9 @@ void addFit(py::module_& module) {
         return fitVolume(volume, options, progress);
       },
       py::arg("volume"), py::kw_only(), py::arg("psnr") = py::none(),
-      py::arg("max_error") = py::none(), py::arg("size") = py::none(),
-      py::arg("count") = py::none(), py::arg("lossless") = false, py::arg("preset") = "standard",
+      py::arg("picture_psnr") = py::none(), py::arg("max_error") = py::none(),
+      py::arg("size") = py::none(), py::arg("count") = py::none(), py::arg("lossless") = false,
+      py::arg("preset") = "standard", py::arg("measure") = "auto", py::arg("tone") = py::none(),
       py::arg("effort") = kUsualEffort, py::arg("representation") = "auto",
       py::arg("storage") = "compact", py::arg("device") = "auto", py::arg("seed") = 1,
       py::arg("progress") = py::none(), kFitText);

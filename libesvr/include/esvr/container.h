@@ -13,6 +13,7 @@
 #include "esvr/ellipsoids.h"
 #include "esvr/grid.h"
 #include "esvr/quantised.h"
+#include "esvr/tone.h"
 #include "esvr/volume.h"
 
 namespace esvr {
@@ -61,6 +62,10 @@ struct StoredGrid {
   /// `field` and of `voxels` then is a value among the active ones, to which these are relative, and
   /// decoded inactive voxels get the background of `descriptor`. Only with kMask or with voxels.
   bool farBackground = false;
+  /// The sum of ellipsoids and quantised voxels are tones, which decodeGrid() turns into values; exact
+  /// voxels are values, as are all other members. Only with a background of 0, with `withinRange`, and
+  /// without a far background or a residual.
+  ToneCurve tone;
   bool withinRange = true;  ///< decoded values are clamped to the source's range of values
   Box activeBox;            ///< active bounding box of the source, index coordinates
   /// Voxels of `activeBox` that are active whatever their values, so that its faces keep an active voxel;

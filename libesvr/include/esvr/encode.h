@@ -21,6 +21,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/paper_method.h"
 #include "esvr/quantised.h"
+#include "esvr/tone.h"
 #include "esvr/volume.h"
 
 namespace esvr {
@@ -28,9 +29,10 @@ namespace esvr {
 /// A single fit, which ends as FitOptions determine.
 struct FitGoal {};
 
-/// The smallest grid found whose error is at most that of presetPsnr(FitOptions::preset) over the
-/// active voxels. Errors at inactive voxels of the box count too, so that the PSNR over the active
-/// voxels alone is at least as high. FitOptions::count, psnr and seconds are ignored.
+/// The smallest grid found with the quality that FitOptions::preset stands for: presetPicturePsnr() if the
+/// measure is what is seen, and otherwise an error of at most that of presetPsnr() over the active voxels.
+/// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
+/// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {};
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
@@ -46,6 +48,13 @@ struct PsnrGoal {
   double psnr = 0.0;  ///< dB
 };
 
+/// The smallest grid found whose transmittance has at least this PSNR (TransmittancePsnr::psnr50,
+/// metrics.h). A volume that is not looked through is converted as for a PresetGoal. FitOptions are as for a
+/// PsnrGoal.
+struct PictureGoal {
+  double psnr = 0.0;  ///< dB
+};
+
 /// A grid of voxels that restores every voxel within a bound.
 struct BoundGoal {
   double bound = 0.0;  ///< largest absolute error, 0 or above
@@ -57,10 +66,21 @@ struct BoundGoal {
 /// A grid that restores every voxel and the active mask bit for bit. It holds voxels.
 struct LosslessGoal {};
 
-using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, BoundGoal, LosslessGoal>;
+using Goal =
+    std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, BoundGoal, LosslessGoal>;
 
-/// PSNR over the active voxels that a preset stands for, dB.
+/// PSNR over the active voxels that a preset stands for, dB, and that of the transmittance.
 [[nodiscard]] double presetPsnr(Preset preset);
+[[nodiscard]] double presetPicturePsnr(Preset preset);
+
+/// What the quality of a PresetGoal and of a SizeGoal means.
+enum class Measure {
+  /// What is seen of a volume that is looked through (isLookedThrough, metrics.h; background 0): the PSNR
+  /// of its transmittance for T = 0.5, unless the PSNR over the active voxels is more than 4 dB below. For
+  /// any other volume, as kValues.
+  kAuto,
+  kValues  ///< the PSNR of values
+};
 
 /// What a stored grid consists of. A BoundGoal and a LosslessGoal always store voxels.
 enum class Representation {
@@ -98,8 +118,13 @@ struct ConvertOptions {
   /// stored (Conversion::fitsTookTooLong).
   int effort = kUsualEffort;
   Representation representation = Representation::kAuto;
-  FitOptions fit;  ///< narrowBand is set by the conversion
-  StorageOptions storage;
+  Measure measure = Measure::kAuto;
+  /// The tone curve by which values are coded (tone.h). A curve without a scale is none. Default: for
+  /// the goals that are measured in pictures, one that is chosen from the values and by short fits; none
+  /// otherwise. A BoundGoal, a LosslessGoal and a background other than 0 have none in any case.
+  std::optional<ToneCurve> tone{};
+  FitOptions fit{};  ///< narrowBand is set by the conversion
+  StorageOptions storage{};
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
   /// Another grid that this one refers to in its file may take its place.
@@ -177,6 +202,9 @@ struct Conversion {
   std::optional<CompactRecord> compact;  ///< set if ellipsoids are stored as kCompact
   std::optional<ChoiceRecord> choice;    ///< set if voxels were considered for the goal
   DecisionRecord decisions;
+  /// True if the goal was measured by what is seen (Measure::kAuto, PictureGoal). The figures of candidates
+  /// in dB then are those of this measure.
+  bool byPictures = false;
   /// True if ellipsoids were not tried because fitting them would take longer than the effort allows.
   bool fitsTookTooLong = false;
   /// Bytes of exact voxels, estimated from a sample, if they are fewer than those of the ellipsoids

@@ -84,6 +84,7 @@ typedef struct esvr_grid {
   uint64_t active_voxels;  ///< number of active voxels of the source
   uint64_t ellipsoids;     ///< 0: the voxels themselves are stored
   int32_t has_residual;    ///< voxels are the sum of the ellipsoids and a correction
+  float tone;              ///< s above 0: a value is s sinh(sum / s) of the sum; 0: it is the sum
 } esvr_grid;
 
 /// Describes a grid.
@@ -104,7 +105,7 @@ typedef struct esvr_ellipsoid {
 esvr_status esvr_get_ellipsoids(const esvr_file* file, size_t grid, uint64_t first, uint64_t count,
                                 esvr_ellipsoid* ellipsoids);
 
-/// Evaluates the sum of a grid's ellipsoids, clamped to the range of the source where the file says
+/// Evaluates the sum of a grid's ellipsoids, as a value by the tone curve if there is one, and clamped to the range of the source where the file says
 /// so, at any places. A fit constrains the sum at voxels only; esvr_sample interpolates between them.
 /// ESVR_USAGE for a grid that stores voxels or a residual; esvr_sample serves those.
 /// \param places  x, y and z of each place

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "esvr/ellipsoids.h"
+#include "esvr/tone.h"
 #include "esvr/volume.h"
 
 namespace esvr {
@@ -52,7 +53,8 @@ void evaluatePlaces(const Field& field, std::span<const Place> places, std::span
 
 /// The rule by which a field becomes voxels.
 struct RevoxeliseOptions {
-  float threshold = 0.0f;             ///< a voxel is active if |V - background| > threshold
+  ToneCurve tone{};        ///< V is the value of the sum by this curve; needs a background of 0
+  float threshold = 0.0f;  ///< a voxel is active if |V - background| > threshold
   std::optional<ValueRange> range{};  ///< values are clamped to this range
   /// The field is a level set, whose background is half the width of its band: a voxel is active if
   /// |V| < background - threshold. Inactive voxels hold the background with the sign of V.

@@ -7,6 +7,7 @@
 
 #include "esvr/ellipsoids.h"
 #include "esvr/grid.h"
+#include "esvr/tone.h"
 #include "esvr/volume.h"
 
 namespace esvr {
@@ -51,10 +52,11 @@ struct TransmittancePsnr {
 /// Estimates medianDepth() of the voxels of a field, for which some of its columns are evaluated, at
 /// most as many for each axis as lie in 2048 bricks. Voxels count whether they would be active or not.
 /// \param box    the active bounding box
-/// \param range  of the active values; the sum is clamped to it and to the background
+/// \param range  of the active values; the value of the sum is clamped to it and to the background
+/// \param tone   the sum is a tone of this curve
 /// \return  as for transmittancePsnr
 [[nodiscard]] std::optional<double> medianDepth(const Field& field, const Box& box,
-                                                const ValueRange& range);
+                                                const ValueRange& range, ToneCurve tone = {});
 
 // Errors of a volume against a reference. Sums are formed in float64 over the bricks of either
 // volume. Empty space within the box counts as voxels but takes no computing time. Where only one

@@ -1,0 +1,64 @@
+#pragma once
+/// What a conversion is judged by, and the tone curve that it codes values with.
+
+#include <optional>
+
+#include "encode/ellipsoids.h"
+#include "encode/job.h"
+#include "esvr/tone.h"
+#include "metrics/transmittance.h"
+
+namespace esvr::encode {
+
+/// Measures how good a volume is, in dB. A volume that is looked through is judged by the transmittance
+/// of its median column of 0.5 (esvr/metrics.h), and every other one by the PSNR over the box.
+class Judge {
+ public:
+  /// \param input  the values; they must outlive the object
+  /// \param tone   the volumes that are judged have tones
+  Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve tone);
+
+  /// True if the goal of the options is one of pictures, and the volume is looked through.
+  [[nodiscard]] static bool seesPictures(const ConvertInput& input, const ConvertOptions& options);
+
+  [[nodiscard]] bool seesPictures() const { return pictures_.has_value(); }
+
+  /// \param volume  decoded tones
+  [[nodiscard]] double operator()(SparseVolume volume) const;
+
+  /// The mean of the transmittance's PSNR for T = 0.5 and 0.1, dB: of two tone curves, the one that is
+  /// better for thin and for dense smoke.
+  [[nodiscard]] double forTones(SparseVolume volume) const;
+
+  [[nodiscard]] const SparseVolume& values() const { return values_; }
+  [[nodiscard]] ToneCurve tone() const { return tone_; }
+
+ private:
+  void toValues(SparseVolume& volume) const;
+
+  const SparseVolume& values_;
+  ToneCurve tone_;
+  ValueRange range_;
+  bool halfs_;
+  CompareOptions box_;
+  /// dB that are added to the PSNR over the box, which then is a second limit of the quality; nothing: it
+  /// is none.
+  std::optional<double> valueGain_;
+  std::optional<metrics::TransmittanceReference> pictures_;
+};
+
+/// The tone curve of a conversion: that of the options, that of the previous frame, or the one with which
+/// a short fit is better than without, where the values call for one.
+struct ToneChoice {
+  ToneCurve tone{};
+  std::optional<Attempt> fit{};  ///< the short fit that was compared
+};
+[[nodiscard]] ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options);
+
+/// The tones of a volume.
+[[nodiscard]] SparseVolume tonesOf(const SparseVolume& volume, ToneCurve tone);
+
+/// Makes a grid of tones, which was converted like one of values, a grid of values.
+void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid);
+
+}  // namespace esvr::encode

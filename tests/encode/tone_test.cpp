@@ -1,0 +1,150 @@
+// Plan: the tone curve and its inverse agree with float64 and with each other to the rounding that docs/math.md
+// states, and are odd and monotone. A smoke of a wide range gets a curve and is better seen with it at the same
+// size; a volume of a narrow range, a signed one and a bounded one get none. The goals of pictures are reached, and
+// the decoded values stay within the range of the source. A curve comes back from a file, and exact voxels have none.
+
+#include "esvr/tone.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "encode/volumes.h"
+#include "esvr/encode.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+namespace {
+
+TEST(ToneCurve, AgreesWithFloat64) {
+  for (const float s : {1e-30f, 0.043f, 7.0f, 1e30f})
+    for (const double factor : {0.0, 1e-6, 0.3, 1.0, 12.0, 1e4}) {
+      const auto v = float(factor * double(s));
+      const ToneCurve tone{s};
+      const double u = double(s) * std::asinh(double(v) / double(s));
+      EXPECT_FLOAT_EQ(tone.of(v), float(u));
+      EXPECT_EQ(tone.of(-v), -tone.of(v));
+      // A rounding error of u, which is half of 2^-23 relative to it, is multiplied by the slope cosh(u / s).
+      const double bound = 0x1p-23 * (std::abs(u) * std::cosh(u / double(s)) + double(v));
+      EXPECT_NEAR(tone.value(tone.of(v)), v, bound);
+      EXPECT_EQ(tone.value(-tone.of(v)), -tone.value(tone.of(v)));
+    }
+}
+
+TEST(ToneCurve, OfScale0IsTheIdentity) {
+  const ToneCurve none;
+  for (const float v : {-3.0f, 0.0f, 1e-40f, 1e38f}) {
+    EXPECT_EQ(none.of(v), v);
+    EXPECT_EQ(none.value(v), v);
+  }
+}
+
+TEST(ToneCurve, BeyondFloat32IsInfinite) {
+  EXPECT_EQ(ToneCurve{1.0f}.value(100.0f), HUGE_VALF);
+  EXPECT_EQ(ToneCurve{1.0f}.value(-100.0f), -HUGE_VALF);
+}
+
+/// Puffs of densities from 0.01 to 10, as smoke has them.
+SparseVolume smoke() {
+  return test::volumeOf({}, 5, 0.0f, [](Coord v) {
+    double sum = 0.0;
+    for (int p = 0; p < 7; ++p) {
+      const double x = v.x - 20.0 - 9.0 * std::cos(1.9 * p),
+                   y = v.y - 20.0 - 9.0 * std::sin(2.3 * p),
+                   z = v.z - 20.0 - 9.0 * std::sin(1.1 * p + 1.0);
+      const double r = (x * x + y * y + z * z) / (9.0 + 4.0 * p);
+      sum += 0.01 * std::pow(10.0, 0.5 * p) * std::exp(-r);
+    }
+    return sum < 1e-4 ? 0.0f : float(sum);
+  });
+}
+
+GridDescriptor fog() {
+  GridDescriptor descriptor;
+  descriptor.gridClass = GridClass::kFogVolume;
+  return descriptor;
+}
+
+Conversion converted(const SparseVolume& volume, ConvertOptions options) {
+  options.fit.iterations = 150;
+  return convertVolume({fog(), volume}, options);
+}
+
+double seen(const SparseVolume& volume, const StoredGrid& grid) {
+  return transmittancePsnr(volume, decodeGrid(grid))->psnr50;
+}
+
+TEST(Tone, ShowsSmokeBetterInTheSameBytes) {
+  const SparseVolume volume = smoke();
+  const Conversion with = converted(volume, {.goal = SizeGoal{900}});
+  const Conversion without = converted(volume, {.goal = SizeGoal{900}, .tone = ToneCurve{}});
+  EXPECT_TRUE(with.grid.tone.isOn());
+  EXPECT_TRUE(with.byPictures);
+  EXPECT_FALSE(without.grid.tone.isOn());
+  EXPECT_LE(bytesAdded(with.grid), 900u);
+  EXPECT_GT(seen(volume, with.grid), seen(volume, without.grid) + 1.0);
+}
+
+TEST(Tone, ReachesTheQualityOfPictures) {
+  const SparseVolume volume = smoke();
+  for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
+    const Conversion made =
+        converted(volume, {.goal = PictureGoal{33.0}, .representation = representation});
+    EXPECT_NE(made.fit.end, FitEnd::kPsnrMissed);
+    EXPECT_GE(seen(volume, made.grid), 33.0);
+    EXPECT_LE(seen(volume, made.grid), 35.0);
+    const ValueRange range = activeRange(volume), back = activeRange(decodeGrid(made.grid));
+    EXPECT_GE(back.min, 0.0f);
+    EXPECT_LE(back.max, range.max);
+    EXPECT_EQ(made.grid.valueMax, range.max);
+  }
+}
+
+TEST(Tone, OfAPresetLimitsTheErrorOfValuesToo) {
+  const SparseVolume volume = smoke();
+  const Conversion made = converted(volume, {.goal = PresetGoal{}});
+  const VolumeMetrics m = compareVolumes(volume, decodeGrid(made.grid), {.transmittance = true});
+  EXPECT_GE(m.transmittance->psnr50, presetPicturePsnr(Preset::kStandard));
+  EXPECT_GE(m.psnrActive, presetPicturePsnr(Preset::kStandard) - 4.0);
+}
+
+TEST(Tone, IsNotUsedWhereItDoesNotServe) {
+  const SparseVolume volume = smoke();
+  EXPECT_FALSE(converted(volume, {.goal = PsnrGoal{35.0}}).grid.tone.isOn());
+  EXPECT_FALSE(
+      converted(volume, {.goal = SizeGoal{900}, .measure = Measure::kValues}).grid.tone.isOn());
+  EXPECT_FALSE(converted(volume, {.goal = LosslessGoal{}}).grid.tone.isOn());
+  EXPECT_FALSE(converted(volume, {.goal = BoundGoal{0.01, true}}).grid.tone.isOn());
+  const Conversion tube = converted(test::tubeVolume(), {.goal = SizeGoal{900}});
+  EXPECT_FALSE(tube.grid.tone.isOn());  // its values differ too little
+}
+
+TEST(Tone, OfAGivenScaleServesSignedValues) {
+  SparseVolume volume = smoke();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    if (volume.bricks[b].x % 2 == 0)
+      for (float& value : volume.brickValues(b)) value = -value;
+  const Conversion made = converted(volume, {.goal = PsnrGoal{35.0}, .tone = ToneCurve{0.1f}});
+  EXPECT_EQ(made.grid.tone, ToneCurve{0.1f});
+  EXPECT_FALSE(made.byPictures);
+  EXPECT_GE(compareVolumes(volume, decodeGrid(made.grid)).psnrBox, 35.0);
+}
+
+TEST(Tone, ComesBackFromAFile) {
+  const SparseVolume volume = smoke();
+  for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
+    const Conversion made =
+        converted(volume, {.goal = SizeGoal{1500}, .representation = representation});
+    EsvrFile file;
+    file.grids.push_back(made.grid);
+    const EsvrFile back = decodeEsvr(encodeEsvr(file), "memory");
+    EXPECT_EQ(back.grids[0].tone, made.grid.tone);
+    EXPECT_EQ(decodeGrid(back.grids[0]).values, decodeGrid(made.grid).values);
+  }
+}
+
+}  // namespace
+}  // namespace esvr
