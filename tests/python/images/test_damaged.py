@@ -115,7 +115,8 @@ def attempts(path, variants, capfd, *words):
     out.parent.mkdir(exist_ok=True)
 
     def convert_all():
-        for k, data in enumerate(variants):
+        for data in variants:
+            path.unlink()  # HDF5 knows files that it has open
             path.write_bytes(data)
             with contextlib.redirect_stderr(io.StringIO()) as said:
                 code = run_here(image2vdb, path, out, "-f", *words)

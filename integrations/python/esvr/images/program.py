@@ -16,7 +16,7 @@ import sys
 import textwrap
 import traceback
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import esvr
 
@@ -56,8 +56,6 @@ class Program:
     options: list
     notes: str
     examples: str
-    arguments: str = "files"
-    texts: dict = field(default_factory=dict)  # further topics of --help
 
     # -- help ------------------------------------------------------------------------------------------------------
     def help(self):
@@ -100,11 +98,9 @@ class Program:
                           ".SH NOTES", notes, *exact("EXAMPLES", self.examples)]) + "\n"
 
     def topic(self, name):
-        if name == "man":
-            return self.man_page()
         if name == "options":
             return "".join(f"--{option.name}\n" for option in self.options + COMMON)
-        return self.texts.get(name, self.help)() if name in self.texts else self.help()
+        return self.man_page() if name == "man" else self.help()
 
     # -- arguments -------------------------------------------------------------------------------------------------
     def parse(self, words):
@@ -340,18 +336,20 @@ def main(program, work):
         return exit_code(error)
 
 
-FRAME_MARK = re.compile(r"#+|%0?\d*d|\$F\d*")
+def number_mark(name):
+    """The place of a number in a name (####, @@@@, %04d or $F4) as a match, and its digits; None and 0 if there is none."""
+    match = re.search(r"#+|@+|%0?\d*d|\$F\d*", name)
+    if not match:
+        return None, 0
+    mark = match[0]
+    return match, 4 if mark == "#" else len(mark) if mark[0] in "#@" else int(re.sub(r"\D", "", mark) or 1)
 
 
 def frame_path(path, number):
-    """The file of a number, if the name has a place for it (####, %04d or $F4)."""
+    """The file of a number, if the name has a place for it."""
     folder, name = os.path.split(os.fspath(path))
-    mark = FRAME_MARK.search(name)
-    if not mark:
-        return path
-    text = mark[0]
-    digits = 4 if text == "#" else len(text) if text[0] == "#" else int(re.sub(r"\D", "", text) or 1)
-    return os.path.join(folder, f"{name[:mark.start()]}{number:0{digits}d}{name[mark.end():]}")
+    mark, digits = number_mark(name)
+    return os.path.join(folder, f"{name[:mark.start()]}{number:0{digits}d}{name[mark.end():]}") if mark else path
 
 
 def check_output(path, extensions, overwrite, inputs=()):
