@@ -1,4 +1,5 @@
 """Damaged files of each kind end with exit code 3, the file's name, no output and no traceback, and nothing is left behind."""
+import bz2
 import contextlib
 import faulthandler
 import importlib
@@ -218,6 +219,28 @@ def test_promises_are_checked_before_memory_is_taken(tmp_path, capfd, name):
     assert attempt(path, capfd, *words) == 3
 
 
+@pytest.mark.parametrize("name, content", [
+    ("bz.nrrd", b"NRRD0004\ntype: ushort\ndimension: 3\nsizes: 60000 50000 40000\nendian: little\nencoding: bzip2\n\n" + bz2.compress(
+        bytes(240))),
+    ("z.mha", b"NDims = 3\nDimSize = 6 5 4\nElementType = MET_USHORT\nCompressedData = True\nElementDataFile = LOCAL\n" +
+     zlib.compress(np.random.default_rng(0).bytes(240))[:-9]),
+    ("a.mhd", b"NDims = 3\nDimSize = 6 5 4\nElementType = MET_USHORT\nElementDataFile = none.raw\n"),
+    ("a.nhdr", b"NRRD0004\ntype: ushort\ndimension: 3\nsizes: 6 5 4\nendian: little\nencoding: raw\ndata file: LIST\nnone\n")])
+def test_packed_and_detached_data(tmp_path, capfd, name, content):
+    (tmp_path / name).write_bytes(content)
+    assert attempt(tmp_path / name, capfd) == 3
+
+
+def test_damaged_descriptions_and_slices(tmp_path, capfd):
+    text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image'
+    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
+    assert attempt(tmp_path / "a.ome.tif", capfd) == 3
+    folder = dicom(tmp_path / "series", ramp(), tool=("dcmcrle",))
+    cut = folder / "s2.dcm"
+    cut.write_bytes(cut.read_bytes()[:-30])
+    assert attempt(folder, capfd) == 3
+
+
 def test_unknown_files(tmp_path, capfd):
     (tmp_path / "a.jpg").write_bytes(b"\xff\xd8\xff\xe0" + bytes(100))
     assert attempt(tmp_path / "a.jpg", capfd) == 2  # it may be a RAW image, whose sizes are then asked for
@@ -295,6 +318,13 @@ def test_help_fits_on_a_screen(capfd):
 
 
 def test_memory_is_limited(tmp_path, capfd):
+    values = np.zeros((64, 300, 300), "u2")
+    values[50:60] = 7
+    np.save(tmp_path / "b.npy", values)  # larger than the limit, and read in slabs
+    assert run_here(image2vdb, tmp_path / "b.npy", tmp_path / "b.vdb", "--max-memory", "10MB") == 0
+    assert "900000 active voxels" in capfd.readouterr().err
+    (tmp_path / "b.npy").unlink()
+    (tmp_path / "b.vdb").unlink()
     np.save(tmp_path / "a.npy", np.zeros((16, 400, 400), "f4"))
     assert run_here(image2vdb, tmp_path / "a.npy", tmp_path / "o.vdb", "--max-memory", "1M") == 5
     assert "--max-memory" in capfd.readouterr().err

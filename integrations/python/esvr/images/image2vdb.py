@@ -314,13 +314,15 @@ def pack(name, part, options, log, kind, normal, has_missing):
         metadata["length_unit"] = unit
     if image.unit:
         metadata["image_unit"] = image.unit
-    scale = 1.0 / normal if normal else 1.0
     threshold = options.threshold
+
+    def as_value(number):  # with the same rounding as voxels
+        return float(np.float32(number / normal)) if normal else number
     if has_missing and threshold is None and kind != "bool":
         metadata["image_missing"] = True  # all inactive voxels are missing
     by_builder = kind in ("float", "double", "int32", "int64")
-    builder = esvr.GridBuilder(kind, name=name, background=options.background * scale if by_builder else 0,
-                               threshold=threshold * scale if threshold is not None and by_builder else None,
+    builder = esvr.GridBuilder(kind, name=name, background=as_value(options.background) if by_builder else 0,
+                               threshold=as_value(threshold) if threshold is not None and by_builder else None,
                                grid_class="fog volume" if kind == "float" else "unknown", transform=matrix, metadata=metadata,
                                max_bytes=options.max_memory)
     for first, values, gone in slabs(part, options, log):

@@ -164,10 +164,17 @@ def hdf5_arrays(h5py, file):
     return found
 
 
+# Formats within HDF5 whose numbers are not values, or whose arrays are larger than the image, by one of their groups.
+HDF5_OTHERS = {"minc-2.0": "MINC", "DataSetInfo": "Imaris", "__DATA_TYPES__": "BigDataViewer", "ITKImage": "ITK"}
+
+
 def read_hdf5(path, options):
     h5py = need("h5py", "python3-h5py", path, "HDF5")
     with reading(path, "HDF5"):
         file = h5py.File(path, "r")
+        for name, program in HDF5_OTHERS.items():
+            if name in file:
+                raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or OME-TIFF")
         found = {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items()
                  if is_real(item.dtype)}
         if options.dataset and isinstance(file.get(options.dataset), h5py.Dataset):
@@ -347,15 +354,17 @@ def zarr_images(zarr, group, prefix="/"):
 
 def plain_zarr(zarr, path, array, level, options):
     """An array; xarray names its dimensions, whose coordinates are arrays of their names."""
-    names, warnings = array.attrs.get("_ARRAY_DIMENSIONS") or [], check_chunks(path, array)
+    names, warnings, attributes = array.attrs.get("_ARRAY_DIMENSIONS") or [], check_chunks(path, array), plain(array.attrs.asdict())
     if len(names) != array.ndim:
         names = [""] * array.ndim
+    elif array.fill_value is not None:  # which xarray writes for _FillValue
+        attributes.setdefault("_FillValue", array.fill_value)
     coordinates, parent = [], array.path.rpartition("/")[0]
     for name in names:
         beside = f"{parent}/{name}".strip("/")
         is_there = name and beside != array.path and zarr.storage.contains_array(array.store, beside)
         coordinates.append(coordinates_of(zarr.open_array(array.store, path=beside, mode="r")) if is_there else None)
-    image = described_image("Zarr", path, names, coordinates, array, plain(array.attrs.asdict()), options, array.chunks[0])
+    image = described_image("Zarr", path, names, coordinates, array, attributes, options, array.chunks[0])
     image.warnings += warnings
     return image
 

@@ -81,6 +81,8 @@ def read_tiff(path, options):
     tifffile = need("tifffile", "python3-tifffile", path, "TIFF")
     with reading(path, "TIFF"):
         file = tifffile.TiffFile(path)
+        if "openmicroscopy.org" in (file.pages.first.description or "") and not file.is_ome:
+            raise esvr.BadInput(f"{path}: its OME-XML is damaged")
         series, number = series_of(path, file, options.dataset)
         page = next((page.keyframe for page in series.pages if page is not None), file.pages.first)
         if page.dtype is None:
