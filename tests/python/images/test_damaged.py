@@ -1,6 +1,7 @@
 """Damaged files of each kind end with exit code 3, the file's name, no output and no traceback, and nothing is left behind."""
 import bz2
 import contextlib
+import errno
 import faulthandler
 import importlib
 import io
@@ -11,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 import zlib
 from unittest import mock
 
@@ -18,7 +20,7 @@ import numpy as np
 import pytest
 
 import esvr
-from esvr.images import image2vdb, program
+from esvr.images import image, image2vdb, program
 
 from conversions import dicom, ramp, run_here
 
@@ -229,6 +231,15 @@ def test_promises_are_checked_before_memory_is_taken(tmp_path, capfd, name):
 def test_packed_and_detached_data(tmp_path, capfd, name, content):
     (tmp_path / name).write_bytes(content)
     assert attempt(tmp_path / name, capfd) == 3
+
+
+def test_no_place_for_temporary_files(tmp_path, capfd, monkeypatch):
+    def full():
+        raise OSError(errno.ENOSPC, "No space left on device")
+    make_gzip_nrrd(tmp_path / "a.nrrd")
+    monkeypatch.setattr(image, "tempfile", types.SimpleNamespace(TemporaryFile=full))
+    assert run_here(image2vdb, tmp_path / "a.nrrd", tmp_path / "o.vdb") == 1  # the image is not damaged
+    assert "TMPDIR names another folder" in capfd.readouterr().err
 
 
 def test_damaged_descriptions_and_slices(tmp_path, capfd):

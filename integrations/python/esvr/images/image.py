@@ -190,16 +190,29 @@ def mapped(path, dtype, shape, offset=0, file=None):
 def unpacked(path, dtype, shape, offset=0, skip=0, method="deflate"):
     """As mapped(), of numbers that zlib, gzip or bzip2 has made smaller: they are unpacked into a temporary file. skip is a
     number of bytes after unpacking."""
-    needed, file = product(shape) * np.dtype(dtype).itemsize + skip, tempfile.TemporaryFile()
+    needed = product(shape) * np.dtype(dtype).itemsize + skip
     with open(path, "rb") as source:
         source.seek(offset)
         if method == "deflate":
             require_bytes(path, needed / MOST_DEFLATED, os.path.getsize(path) - offset, "the compressed array, at the least,")
         unzipped = bz2.BZ2File(source) if method == "bzip2" else None
+        with writing_temporary(path):
+            file = tempfile.TemporaryFile()
         for piece in iter(lambda: unzipped.read(CHUNK), b"") if unzipped else inflated(source):
-            file.write(piece[:needed - file.tell()])  # also behind the array, to the checksum at the end
-    file.flush()
+            with writing_temporary(path):  # pieces behind the array are read for the checksum at the end
+                file.write(piece[:needed - file.tell()])
+                file.flush()
     return mapped(path, dtype, shape, skip, file)
+
+
+@contextlib.contextmanager
+def writing_temporary(path):
+    """Tells errors of the temporary file from those of the input."""
+    try:
+        yield
+    except OSError as error:
+        raise esvr.Error(f"{path} is unpacked into a temporary file, which cannot be written: {error.strerror or error} (TMPDIR names "
+                         "another folder)") from error
 
 
 def inflated(file):

@@ -39,15 +39,6 @@ def place(text):
     return text if text == "all" else count(text)
 
 
-def word_of(*words):
-    def parse(text):
-        if text not in words:
-            raise argparse.ArgumentTypeError(f"it is one of {', '.join(words)}, not '{text}'")
-        return text
-    parse.__name__ = "word"
-    return parse
-
-
 PROGRAM = Program(
     "image2vdb", "Converts an image of voxels to sparse VDB grids.",
     "  image2vdb IN... OUT.vdb [options]     IN: an image, slices in order, a folder or 'ct_####.tif'",
@@ -59,16 +50,15 @@ PROGRAM = Program(
      Option("dataset", "NAME", "HDF5, netCDF, Zarr, VTI: the array; DICOM: the series; OME-TIFF: the image"),
      Option("axes", "LETTERS", "what the axes are, the slowest first: tczyx; v for components of vectors"),
      Option("stored", "", "the stored numbers, not the calibrated values"),
-     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", word_of("auto", "float", "double", "integer", "mask"),
-            default="auto"),
+     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"), default="auto"),
      Option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)"),
      Option("voxel-size", "S|X,Y,Z", "edges of a voxel, instead of the transform of the image", three(float)),
      Option("nonfinite", "WORD", "NaN and infinite voxels: refuse, zero or missing (refuse)",
-            word_of("refuse", "zero", "missing"), default="refuse"),
+            ("refuse", "zero", "missing"), default="refuse"),
      Option("normalise", "", "divide by the type's largest value, or by the largest of a float image"),
      Option("dims", "X,Y,Z", "RAW: number of voxels along each axis", three(int)),
      Option("type", "TYPE", "RAW: uint8, int16, float32, ..."),
-     Option("endian", "little|big", "RAW: byte order (little)", word_of("little", "big"), default="little"),
+     Option("endian", "little|big", "RAW: byte order (little)", ("little", "big"), default="little"),
      Option("skip", "BYTES", "RAW: length of a header (0)", count, default=0),
      Option("max-memory", "SIZE", "limit on the memory of the image and of the grid (4G)", byte_size, default=4 * 10 ** 9),
      Option("force", "", "replace OUT.vdb if it exists", short="f")],
@@ -283,7 +273,6 @@ def normal_of(part, options, log):
 
 class Tally:
     missing = nonfinite = 0
-    first = None
     is_rounded = False
 
 
@@ -376,28 +365,20 @@ def finite(values, kind, part, tally, first, gone, options):
     exact, values = values, values.astype(np.float64 if kind == "double" else np.float32, copy=False)
     if part.image.scale is None and values.dtype.itemsize < exact.dtype.itemsize:
         tally.is_rounded = tally.is_rounded or bool(np.any((values != exact) & np.isfinite(exact)))
-    bad = ~np.isfinite(values)
-    if gone is not None:
-        bad &= ~(gone if values.ndim == 3 else gone[..., np.newaxis])
-    if bad.any():
-        if options.nonfinite == "missing":
-            bad = bad.any(axis=3) if bad.ndim == 4 else bad
-            gone = bad if gone is None else gone | bad
-        else:
-            refuse_nonfinite(part, tally, first, bad, options)
-    if gone is not None or bad.any():
-        values = np.where(np.isfinite(values), values, values.dtype.type(0))
-    return values, gone
-
-
-def refuse_nonfinite(part, tally, first, bad, options):
-    tally.nonfinite += int(bad.sum())
-    if tally.first is None:
-        at = [int(n) for n in np.argwhere(bad)[0][:3]]
+    good = np.isfinite(values)
+    if good.all():
+        return values, gone
+    bad = ~good if gone is None else ~(good | (gone if values.ndim == 3 else gone[..., np.newaxis]))
+    bad = bad.any(axis=3) if values.ndim == 4 else bad
+    if options.nonfinite == "refuse" and bad.any():
+        at = [int(n) for n in np.argwhere(bad)[0]]
         at[part.slab_axis] += first
-        tally.first = tuple(at)
-    if options.nonfinite == "refuse":
-        raise esvr.BadInput(f"{part.image.path}: the voxel {tally.first} is not finite (--nonfinite zero replaces such voxels by 0)")
+        raise esvr.BadInput(f"{part.image.path}: the voxel {tuple(at)} is not finite (--nonfinite zero replaces such voxels by 0)")
+    if options.nonfinite == "missing":
+        gone = bad if gone is None else gone | bad
+    else:
+        tally.nonfinite += int(bad.sum())
+    return np.where(good, values, values.dtype.type(0)), gone
 
 
 # -- the program ---------------------------------------------------------------------------------------------------

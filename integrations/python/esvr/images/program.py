@@ -27,14 +27,13 @@ CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.
 
 @dataclass
 class Option:
-    """An option of a program. Without a name for its value it is a switch; with a kind, its text is converted."""
+    """An option of a program. Without a name for its value it is a switch; kind converts its text, or has the texts that it may be."""
     name: str
     value: str
     text: str
     kind: object = str
     short: str = ""
     default: object = None
-    repeated: bool = False
 
     def title(self):
         names = f"-{self.short}, --{self.name}" if self.short else f"--{self.name}"
@@ -111,9 +110,10 @@ class Program:
             names = [f"--{option.name}"] + ([f"-{option.short}"] if option.short else [])
             if not option.value:
                 parser.add_argument(*names, action="store_true")
+            elif isinstance(option.kind, tuple):
+                parser.add_argument(*names, choices=option.kind, default=option.default)
             else:
-                parser.add_argument(*names, type=option.kind, default=[] if option.repeated else option.default,
-                                    action="append" if option.repeated else "store", metavar=option.value)
+                parser.add_argument(*names, type=option.kind, default=option.default)
         arguments = parser.parse_intermixed_args(words)
         if arguments.help:
             sys.stdout.write(self.topic(arguments.files[0] if arguments.files else ""))
