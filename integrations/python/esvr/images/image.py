@@ -211,8 +211,8 @@ def writing_temporary(path):
     try:
         yield
     except OSError as error:
-        raise esvr.Error(f"{path} is unpacked into a temporary file, which cannot be written: {error.strerror or error} (TMPDIR names "
-                         "another folder)") from error
+        raise esvr.Error(f"{path} is unpacked into a temporary file, which cannot be written: {error.strerror or error} "
+                         "(TMPDIR names another folder)") from error
 
 
 def inflated(file):

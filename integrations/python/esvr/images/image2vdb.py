@@ -50,7 +50,8 @@ PROGRAM = Program(
      Option("dataset", "NAME", "HDF5, netCDF, Zarr, VTI: the array; DICOM: the series; OME-TIFF: the image"),
      Option("axes", "LETTERS", "what the axes are, the slowest first: tczyx; v for components of vectors"),
      Option("stored", "", "the stored numbers, not the calibrated values"),
-     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"), default="auto"),
+     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"),
+            default="auto"),
      Option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)"),
      Option("voxel-size", "S|X,Y,Z", "edges of a voxel, instead of the transform of the image", three(float)),
      Option("nonfinite", "WORD", "NaN and infinite voxels: refuse, zero or missing (refuse)",
@@ -290,8 +291,8 @@ def convert(name, part, options, log):
             has_missing = True
         except Beyond as beyond:
             if getattr(options, "as") != "auto" or normal or part.is_vector:
-                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind].bit_length() - 1}, up to which "
-                                    f"a grid of type {kind} holds whole numbers; --as integer keeps it") from beyond
+                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind].bit_length() - 1}, up to "
+                                    f"which a grid of type {kind} holds whole numbers; --as integer keeps it") from beyond
             kind = "int32" if part.image.dtype == np.int32 and part.image.scale is None else "int64"
 
 
@@ -344,7 +345,8 @@ def converted(values, kind, part, tally, first, gone, options):
     if kind in ("int32", "int64"):
         inside = values if gone is None else values[~gone]
         if values.dtype == np.uint64 and inside.size and int(inside.max()) > 2 ** 63 - 1:
-            raise esvr.BadInput(f"{part.image.path}: the value {inside.max()} is beyond 2^63 - 1, the largest that an Int64 grid holds")
+            raise esvr.BadInput(f"{part.image.path}: the value {inside.max()} is beyond 2^63 - 1, the largest that an Int64 grid "
+                                "holds")
         return values.astype(kind), gone
     if values.dtype.kind in "iu" and values.dtype.itemsize > 2:
         inside = values if gone is None else values[~gone]
@@ -398,8 +400,8 @@ def work(arguments):
     *inputs, out = arguments.files
     is_sequence = arguments.time == "all"
     if is_sequence and program.frame_path(out, 0) == out:
-        raise esvr.UsageError(f"--time all writes a file for each time, whose name must have a place for its number, as OUT.####.vdb, "
-                              f"and {out} has none")
+        raise esvr.UsageError("--time all writes a file for each time, whose name must have a place for its number, as "
+                              f"OUT.####.vdb, and {out} has none")
     program.check_output(program.frame_path(out, 0) if is_sequence else out, (".vdb", ".nvdb"), arguments.force, inputs)
     log = program.Log(PROGRAM.name, arguments)
 

@@ -27,7 +27,8 @@ CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.
 
 @dataclass
 class Option:
-    """An option of a program. Without a name for its value it is a switch; kind converts its text, or has the texts that it may be."""
+    """An option of a program. Without a name for its value it is a switch; kind converts its text, or has the texts that it
+    may be."""
     name: str
     value: str
     text: str

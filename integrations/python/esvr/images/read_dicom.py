@@ -143,9 +143,11 @@ def image_of(where, header, frames, options):
     if samples > 1:
         axes.append(Axis("sample", samples))
     dtype, fetch, scale, missing = numbers_of(volumes, samples, options)
-    return Image("DICOM", where, axes, dtype, fetch, LPS_TO_RAS @ affine, "mm" if first.spacing is not None else None, scale, missing,
-                 warnings=warnings, metadata={**({} if without else {"image_space": "left-posterior-superior"}),
-                                              **({"value_unit": str(header.RescaleType)} if header.get("RescaleType") else {})})
+    metadata = {} if without else {"image_space": "left-posterior-superior"}
+    if header.get("RescaleType"):
+        metadata["value_unit"] = str(header.RescaleType)
+    return Image("DICOM", where, axes, dtype, fetch, LPS_TO_RAS @ affine, "mm" if first.spacing is not None else None, scale,
+                 missing, warnings=warnings, metadata=metadata)
 
 
 def stacked(where, frames, rows, options):
@@ -176,8 +178,8 @@ def stacked(where, frames, rows, options):
         if wrong.any() and not options.voxel_size:
             at = int(np.argmax(wrong))
             raise esvr.BadInput(f"{where}: the slices {heights[at][0].name} and {heights[at + 1][0].name} are "
-                                f"{np.linalg.norm(steps[at]):.4g} mm apart, and most others {np.linalg.norm(step):.4g} mm; a slice is "
-                                "missing, or the distances differ (--voxel-size takes the slices as evenly spaced)")
+                                f"{np.linalg.norm(steps[at]):.4g} mm apart, and most others {np.linalg.norm(step):.4g} mm; a "
+                                "slice is missing, or the distances differ (--voxel-size takes the slices as evenly spaced)")
         step = (positions[-1] - positions[0]) / (len(positions) - 1)
     matrix = np.eye(4)
     matrix[:3] = np.column_stack([first.along[:3] * rows[1], first.along[3:] * rows[0], step, positions[0]])
@@ -186,8 +188,8 @@ def stacked(where, frames, rows, options):
 
 # -- values ----------------------------------------------------------------------------------------------------------
 def numbers_of(volumes, samples, options):
-    """The type, the function for Image.fetch, the scale and the function for Image.missing. Where each slice has a scale of its own,
-    the numbers are calibrated values, and NaN where they are missing."""
+    """The type, the function for Image.fetch, the scale and the function for Image.missing. Where each slice has a scale of
+    its own, the numbers are calibrated values, and NaN where they are missing."""
     frames, header = [frame for volume in volumes for frame in volume], volumes[0][0].header
     bits, allocated = int(header.get("BitsStored") or 0), int(header.get("BitsAllocated") or 0)
     stored = np.dtype(f"{'i' if header.get('PixelRepresentation') else 'u'}{max(allocated // 8, 1)}")

@@ -174,7 +174,8 @@ def read_hdf5(path, options):
         file = h5py.File(path, "r")
         for name, program in HDF5_OTHERS.items():
             if name in file:
-                raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or OME-TIFF")
+                raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or "
+                                    "OME-TIFF")
         found = {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items()
                  if is_real(item.dtype)}
         if options.dataset and isinstance(file.get(options.dataset), h5py.Dataset):
@@ -187,7 +188,8 @@ def read_hdf5(path, options):
             require_bytes(path, product(dataset.shape) * dataset.dtype.itemsize, os.path.getsize(path) - dataset.id.get_offset(),
                           f"the dataset {name}")
         scales = [dim[0] if len(dim) else None for dim in dataset.dims]
-        names = [dim.label or (scale.name.rpartition("/")[2] if scale is not None else "") for dim, scale in zip(dataset.dims, scales)]
+        names = [dim.label or (scale.name.rpartition("/")[2] if scale is not None else "")
+                 for dim, scale in zip(dataset.dims, scales)]
         coordinates = [coordinates_of(scale) for scale in scales]
         for k, coordinate in enumerate(coordinates):
             if coordinate and str(coordinate[1].get("NAME", "")).startswith("This is a netCDF dimension but not a netCDF variable"):
@@ -195,7 +197,8 @@ def read_hdf5(path, options):
         attributes = plain(dataset.attrs)
         if "axistags" in attributes and not all(names):  # of vigra and ilastik
             names = [tag["key"] for tag in json.loads(attributes["axistags"])["axes"]]
-        image = described_image("HDF5", path, names, coordinates, dataset, attributes, options, dataset.chunks[0] if dataset.chunks else 1)
+        image = described_image("HDF5", path, names, coordinates, dataset, attributes, options,
+                                dataset.chunks[0] if dataset.chunks else 1)
         sizes = attributes.get("element_size_um")
         if sizes is not None and np.size(sizes) == 3:
             image.affine, image.unit = affine_of([abs(float(s)) or 1.0 for s in np.ravel(sizes)[::-1]]), "um"
@@ -253,7 +256,8 @@ def netcdf_left_out(path, known):
     except ImportError:
         return {}
     with h5py.File(path, "r") as file:
-        return {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items() if name not in known}
+        return {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items()
+                if name not in known}
 
 
 CLASSIC_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8, 7: 1, 8: 2, 9: 4, 10: 8, 11: 8}
@@ -396,7 +400,8 @@ def ome_zarr(zarr, path, group, level, options):
         for n, d in zip(array.shape, described)]
     affine, unit = affine_of_steps(axes, [(s, f, d.get("unit")) for s, f, d in zip(steps, firsts, described)])
     block = next((n for n, axis in zip(array.chunks, axes) if axis.kind in SPACE), 1)
-    image = Image("OME-Zarr", path, axes, array.dtype, array.__getitem__, affine, unit, block=block, warnings=check_chunks(path, array))
+    image = Image("OME-Zarr", path, axes, array.dtype, array.__getitem__, affine, unit, block=block,
+                  warnings=check_chunks(path, array))
     labels = [str(c.get("label") or "") for c in group.attrs.get("omero", {}).get("channels", [])]
     if image.axis(CHANNEL) and len(labels) == image.axis(CHANNEL).size and any(labels):
         image.axis(CHANNEL).labels = labels
@@ -409,7 +414,8 @@ def check_chunks(path, array):
     if os.path.isdir(folder) and array.ndim > 1:
         names = os.listdir(folder)
         is_nested = (array._dimension_separator or ".") == "/"
-        if any(re.fullmatch(r"\d+(\.\d+)+", n) if is_nested else n.isdigit() and os.path.isdir(os.path.join(folder, n)) for n in names):
+        if any(re.fullmatch(r"\d+(\.\d+)+", n) if is_nested else n.isdigit() and os.path.isdir(os.path.join(folder, n))
+               for n in names):
             there, said, right = ("0.0.0", "0/0/0", ".") if is_nested else ("0/0/0", "0.0.0", "/")
             raise esvr.BadInput(f"{path}: the chunks are stored as {there}, and .zarray says that they are {said}; correct its "
                                 f"dimension_separator to '{right}'")

@@ -139,7 +139,8 @@ def series_of(path, file, dataset):
 
 
 def ome_series(path, file):
-    """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the dimensions."""
+    """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the
+    dimensions."""
     pixels = ome_pixels(file)[0]
     slow_first = pixels.get("DimensionOrder", "XYCZT")[:1:-1]
     sizes = {letter: int(pixels.get(f"Size{letter}", 1)) for letter in "CZT"}
@@ -180,7 +181,8 @@ def pages_of(path, file, series, page):
             raise esvr.BadInput(f"{path} has one page for {count} slices, and it is compressed")
         return mapped(path, page.dtype.newbyteorder(file.byteorder), series.shape, page.dataoffsets[0])
     if None in series.pages or len(series.pages) < count:
-        raise esvr.BadInput(f"{path}: the pages of some of its {count} planes are missing; they may be in other files of the same image")
+        raise esvr.BadInput(f"{path}: the pages of some of its {count} planes are missing; they may be in other files of the "
+                            "same image")
     for p in series.pages:
         there, ends = p.parent.filehandle.size, [at + size for at, size in zip(p.dataoffsets, p.databytecounts)]
         if max(ends, default=0) > there:

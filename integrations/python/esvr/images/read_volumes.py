@@ -363,8 +363,8 @@ def read_metaimage(path, options):
             axes.append(Axis(VECTOR if channels == 3 and dtype.kind == "f" else CHANNEL, channels))
         fetch = meta_fetch(path, fields, offset, dtype, [axis.size for axis in axes])
         scale = tuple(float(fields.get(f"elementtointensityfunction{name}", n)) for name, n in (("slope", 1), ("offset", 0)))
-        image = Image("MetaImage", path, axes, dtype, fetch, LPS_TO_RAS @ meta_matrix(fields, count), "mm", scale if scale[0] else None,
-                      metadata={"image_space": LPS})
+        image = Image("MetaImage", path, axes, dtype, fetch, LPS_TO_RAS @ meta_matrix(fields, count), "mm",
+                      scale if scale[0] else None, metadata={"image_space": LPS})
     if image.axis(VECTOR):
         image.turn = LPS_TO_RAS[:3, :3]
         image.notes.append("vectors are turned from LPS to RAS")
@@ -495,7 +495,8 @@ def read_vti(path, options):
         array = (data.GetCellData() if is_cells else data.GetPointData()).GetAbstractArray(name)
         count = array.GetNumberOfTuples() if array else 0
         if count != product(size):
-            raise esvr.BadInput(f"{path}: the array '{name}' has {count} values for {product(size)} {'cells' if is_cells else 'points'}")
+            raise esvr.BadInput(f"{path}: the array '{name}' has {count} values for {product(size)} "
+                                f"{'cells' if is_cells else 'points'}")
         numbers, components = vtk_to_numpy(array).copy(), array.GetNumberOfComponents()
         directions = np.array([[data.GetDirectionMatrix().GetElement(r, c) for c in range(3)] for r in range(3)])
         affine = affine_of(data.GetSpacing(), data.GetOrigin(), directions)

@@ -159,8 +159,8 @@ class Volume:
         return facts
 
     def _type(self, format_name, options):
-        possible, grid_type = TYPES[format_name], np.dtype({"bool": "bool", "vec3s": "float32", "float": "float32", "double": "float64"}
-                                                           .get(self.grid.value_type, self.grid.value_type))
+        possible, grid_type = TYPES[format_name], np.dtype({"vec3s": "float32", "float": "float32", "double": "float64"}.get(
+            self.grid.value_type, self.grid.value_type))
         came = self.metadata.get("image_type", grid_type.name)
         if options.type:
             wanted = [options.type]
@@ -189,7 +189,8 @@ class Volume:
                               + ("choose another type" if options.type else "choose another format, or --type of image2vdb"))
 
     def slabs(self, component=None, turn=None):
-        """The slices in the type of the file, contiguous; of vectors all components, or one of them. A 3 x 3 matrix turns vectors."""
+        """The slices in the type of the file, contiguous; of vectors all components, or one of them. A matrix of 3 x 3 turns
+        vectors."""
         for last, values, gone in self._parts():
             if self.components == 3 and turn is not None:
                 values = values @ np.asarray(turn.T, values.dtype)
