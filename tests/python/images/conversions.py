@@ -5,12 +5,13 @@ import pathlib
 import shutil
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
 
 import esvr
-from esvr.images import image2vdb, vdb2image
+from esvr.images import image2vdb, program
 from esvr.images.image import LPS_TO_RAS
 
 
@@ -96,23 +97,6 @@ def run(program, *words, **options):
                           env={**os.environ, "PYTHONPATH": path}, **options)
 
 
-def to_image(source, out, *words):
-    """vdb2image in this process, without the child."""
-    arguments = vdb2image.PROGRAM.parse([str(source), str(out), *words])
-
-    class Log(Quiet):
-        texts = []
-
-        def warning(self, text):
-            self.texts.append(text)
-    log = Log()
-    log.texts = []
-    grid = esvr.PackedGrid.from_file(str(source), arguments.grid)
-    name, write = next(found for endings, found in vdb2image.FORMATS.items() if str(out).lower().endswith(endings))
-    write(str(out), vdb2image.Volume(grid, out, name, arguments, log))
-    return log.texts
-
-
 def dicom(folder, values, *, matrix=None, tool=None, change=None, names=None):
     """Writes a series by pydicom, a file for each slice, and turns it by a program of dcmtk."""
     pydicom = pytest.importorskip("pydicom")
@@ -152,10 +136,7 @@ def dicom(folder, values, *, matrix=None, tool=None, change=None, names=None):
 
 
 def run_here(module, *words):
-    """Runs a program in this process (and the child that it starts), which is faster. Returns the exit code."""
-    before = sys.argv
-    sys.argv = ["program", *map(str, words)]
-    try:
+    """Runs a program in this process, and its work, too, for which it would start a child process. Returns the exit code."""
+    with mock.patch.object(program, "run_in_child", lambda name, inputs, outputs, work, verbose: program.run_here(name, work, verbose)), \
+            mock.patch.object(sys, "argv", ["program", *map(str, words)]):
         return module.main()
-    finally:
-        sys.argv = before

@@ -2,6 +2,7 @@
 
 Most of these cases are those in which one of VTK, ITK, GDAL, Pillow, xarray or zarr is wrong.
 """
+import gzip
 import json
 import struct
 import zlib
@@ -107,6 +108,23 @@ def test_skips_of_nrrd(tmp_path):
     assert np.array_equal(convert(tmp_path / "b.nhdr").values, ramp())
 
 
+def test_lists_of_files_of_nrrd(tmp_path):
+    volumes = np.stack([ramp(), ramp() + 1000])
+    for t, volume in enumerate(volumes):
+        (tmp_path / f"v{t}.gz").write_bytes(gzip.compress(volume.tobytes()))
+        for z, page in enumerate(volume):
+            (tmp_path / f"s{t}{z}").write_bytes(page.tobytes())
+    head = "NRRD0004\ntype: ushort\nendian: little\ndimension: 4\nsizes: 6 5 4 2\nkinds: domain domain domain time\nencoding: "
+    (tmp_path / "a.nhdr").write_text(head + "gzip\ndata file: LIST 3\nv0.gz\nv1.gz\n")
+    (tmp_path / "b.nhdr").write_text(head + "raw\ndata file: LIST 2\n" + "".join(f"s{t}{z}\n" for t in range(2) for z in range(4)))
+    for name in "a.nhdr", "b.nhdr":
+        assert np.array_equal(convert(tmp_path / name, "--time", 1).values, volumes[1])
+    # Each file may have several of the slices.
+    (tmp_path / "c.nhdr").write_text("NRRD0004\ntype: ushort\nendian: little\ndimension: 3\nsizes: 6 5 8\nencoding: gzip\n"
+                                     "data file: LIST 3\nv0.gz\nv1.gz\n")
+    assert np.array_equal(convert(tmp_path / "c.nhdr").values, volumes.reshape(8, 5, 6))
+
+
 def test_segments_of_nrrd(tmp_path):
     path = nrrd(tmp_path / "a.seg.nrrd", [("dimension", "3"), ("sizes", "6 5 4"), ("space", "LPS"), ("space directions",
                 "(1,0,0) (0,1,0) (0,0,1)")], ramp())
@@ -155,6 +173,15 @@ def test_axes_of_nifti(tmp_path):
     assert np.array_equal(convert(path).values, ramp())
     times = nifti(tmp_path / "t.nii", np.stack([ramp("i2"), ramp("i2") + 1000]))
     refused(esvr.UsageError, "time: 2; choose by --time", times)
+
+
+def test_names_members_and_zeros_behind(tmp_path):
+    values = np.random.default_rng(1).integers(0, 9999, (40, 50, 60)).astype("i2")
+    data = nifti(tmp_path / "a.nii", values).read_bytes()
+    packed = b"".join(gzip.compress(data[at:at + 60000], 1) for at in range(0, len(data), 60000)) + bytes(512)
+    for name in "b.nii.gz", "b.nii", "scan":  # bgzip makes several members, tapes have zeros behind
+        (tmp_path / name).write_bytes(packed)
+        assert np.array_equal(convert(tmp_path / name).values, values)
 
 
 # -- TIFF --------------------------------------------------------------------------------------------------------------
@@ -479,6 +506,29 @@ def test_several_variables_are_listed(tmp_path):
     assert convert(tmp_path / "a.nc", "--dataset", "v").values[0, 0, 0] == 1001
 
 
+def test_dimensions_in_any_order(tmp_path):
+    netcdf = pytest.importorskip("netCDF4")
+    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
+        for dim, size in zip(("lev", "lat", "lon"), (4, 5, 6)):
+            file.createDimension(dim, size)
+        file.createVariable("t", "f4", ("lon", "lat", "lev"))[:] = ramp().transpose(2, 1, 0)
+    assert np.array_equal(convert(tmp_path / "a.nc").values, ramp())
+    with pytest.importorskip("h5py").File(tmp_path / "a.h5", "w") as file:
+        data = file.create_dataset("d", data=np.stack([ramp(), ramp() + 1000], axis=-1))
+        for k, label in enumerate("zyxc"):
+            data.dims[k].label = label
+    assert np.array_equal(convert(tmp_path / "a.h5", "--channel", 1).values, ramp() + 1000)
+
+
+@pytest.mark.parametrize("array, program", [("minc-2.0/image/0/image", "MINC"), ("ITKImage/0/VoxelData", "ITK"), (
+    "DataSet/ResolutionLevel 0/TimePoint 0/Channel 0/Data", "Imaris")])
+def test_formats_within_hdf5_are_refused(tmp_path, array, program):
+    with pytest.importorskip("h5py").File(tmp_path / "a.h5", "w") as file:
+        file[array] = ramp()
+        file.require_group("DataSetInfo" if program == "Imaris" else "x")
+    refused(esvr.BadInput, f"HDF5 file of {program}", tmp_path / "a.h5")
+
+
 def test_axes_without_names_of_hdf5(tmp_path):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.h5", "w") as file:
@@ -624,6 +674,13 @@ def test_times_of_dicom(tmp_path):
     dicom(folder, ramp() + 1000, change=second, names=[f"t{k}.dcm" for k in range(4)])
     refused(esvr.UsageError, "time: 2", folder)
     assert np.array_equal(convert(folder, "--time", 1).values, ramp() + 1000)
+
+
+def test_sagittal_slices(tmp_path):
+    matrix = np.array([[0, 0, 2.0, 3], [0.5, 0, 0, 4], [0, -0.75, 0, 5], [0, 0, 0, 1]])
+    made = convert(dicom(tmp_path / "s", ramp(), matrix=matrix))
+    assert np.array_equal(made.values, ramp()[::-1])  # the normal leads to the other side
+    assert np.allclose(made.matrix, matrix @ [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 3], [0, 0, 0, 1]], atol=1e-5)
 
 
 def test_a_tilted_gantry_shears(tmp_path):

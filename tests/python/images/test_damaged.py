@@ -1,7 +1,10 @@
 """Damaged files of each kind end with exit code 3, the file's name, no output and no traceback, and nothing is left behind."""
+import bz2
 import contextlib
+import errno
 import faulthandler
 import importlib
+import io
 import json
 import os
 import shutil
@@ -9,13 +12,15 @@ import signal
 import subprocess
 import sys
 import time
+import types
 import zlib
+from unittest import mock
 
 import numpy as np
 import pytest
 
 import esvr
-from esvr.images import image2vdb, program
+from esvr.images import image, image2vdb, program
 
 from conversions import dicom, ramp, run_here
 
@@ -95,12 +100,8 @@ FILES = {"a.nii": make_nifti, "a.nii.gz": make_nifti, "a.nrrd": make_nrrd, "b.nr
          "a.vti": make_vti, "a.npy": make_npy, "a.dcm": make_dicom}
 
 
-def attempt(path, capfd, *words):
-    """Converts a file. Returns the exit code, after a check of what is left behind and printed."""
-    out = path.parent / "out/o.vdb"
-    out.parent.mkdir(exist_ok=True)
-    code = run_here(image2vdb, path, out, "-f", *words)
-    said = capfd.readouterr().err
+def checked(path, out, code, said):
+    """The exit code, after a check of what is left behind and printed."""
     assert "Traceback" not in said
     assert code in (0, 2, 3, 5), said
     if code:
@@ -110,30 +111,62 @@ def attempt(path, capfd, *words):
     return code
 
 
+def attempts(path, variants, capfd, *words):
+    """Converts a file with each of these contents, and returns the exit codes. One child process does so for all of them; a
+    content that crashes a library there has a process of its own, as in the program."""
+    out = path.parent / "out/o.vdb"
+    out.parent.mkdir(exist_ok=True)
+
+    def convert_all():
+        for data in variants:
+            path.unlink()  # HDF5 knows files that it has open
+            path.write_bytes(data)
+            with contextlib.redirect_stderr(io.StringIO()) as said:
+                code = run_here(image2vdb, path, out, "-f", *words)
+            checked(path, out, code, said.getvalue())
+            codes_path.open("a").write(f"{code}\n")
+    codes_path = path.parent / "codes"
+    codes_path.write_text("")
+    assert program.run_in_child("test", [], [], convert_all, True) != 1, capfd.readouterr().err
+    codes = [int(code) for code in codes_path.read_text().split()]
+    for left in out.parent.iterdir():  # by a crash
+        left.unlink()
+    for data in variants[len(codes):]:
+        path.write_bytes(data)
+        codes.append(attempt(path, capfd, *words))
+    return codes
+
+
+def attempt(path, capfd, *words):
+    """Converts a file as the program does, in a child process."""
+    out = path.parent / "out/o.vdb"
+    out.parent.mkdir(exist_ok=True)
+    with mock.patch.object(sys, "argv", ["image2vdb", str(path), str(out), "-f", *words]):
+        code = image2vdb.main()
+    return checked(path, out, code, capfd.readouterr().err)
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_cut_files(tmp_path, capfd, name):
     path = tmp_path / name
     FILES[name](path)
     whole = path.read_bytes()
-    assert attempt(path, capfd) == 0
-    for share in (0.97, 0.5, 0.02):
-        path.write_bytes(whole[:int(len(whole) * share)])
-        # The last bytes of HDF5 and XML need not be those of the array.
-        assert attempt(path, capfd) == 3 or share == 0.97 and name in ("a.vti", "a.dcm", "a.ome.tif")
+    found = attempts(path, [whole] + [whole[:int(len(whole) * share)] for share in (0.97, 0.5, 0.02)], capfd)
+    # The last bytes of HDF5 and XML need not be those of the array.
+    assert found == [0, 3, 3, 3] or found == [0, 0, 3, 3] and name in ("a.vti", "a.dcm", "a.ome.tif")
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_changed_bytes(tmp_path, capfd, name):
     path = tmp_path / name
     FILES[name](path)
-    whole = path.read_bytes()
-    rng = np.random.default_rng(7)
+    rng, whole, variants = np.random.default_rng(7), path.read_bytes(), []
     for _ in range(6):
         data = bytearray(whole)
         for at in rng.integers(0, min(len(data), 700), 3):
             data[at] = rng.integers(0, 256)
-        path.write_bytes(data)
-        attempt(path, capfd)
+        variants.append(data)
+    attempts(path, variants, capfd)
 
 
 @pytest.mark.parametrize("name, magic", [("a.tif", b"II*\0\x08\0\0\0"), ("a.h5", b"\x89HDF\r\n\x1a\n"), ("a.nc", b"CDF\1"),
@@ -186,6 +219,37 @@ def test_promises_are_checked_before_memory_is_taken(tmp_path, capfd, name):
         path.write_bytes(path.read_bytes().replace(b"6 5 4", b"2000 2000 2000").replace(b"0 5 0 4 0 3", b"0 1999 0 1999 0 1999"))
     words = ["--dims", "2000,2000,2000", "--type", "uint8"] if name == "a.raw" else []
     assert attempt(path, capfd, *words) == 3
+
+
+@pytest.mark.parametrize("name, content", [
+    ("bz.nrrd", b"NRRD0004\ntype: ushort\ndimension: 3\nsizes: 60000 50000 40000\nendian: little\nencoding: bzip2\n\n" + bz2.compress(
+        bytes(240))),
+    ("z.mha", b"NDims = 3\nDimSize = 6 5 4\nElementType = MET_USHORT\nCompressedData = True\nElementDataFile = LOCAL\n" +
+     zlib.compress(np.random.default_rng(0).bytes(240))[:-9]),
+    ("a.mhd", b"NDims = 3\nDimSize = 6 5 4\nElementType = MET_USHORT\nElementDataFile = none.raw\n"),
+    ("a.nhdr", b"NRRD0004\ntype: ushort\ndimension: 3\nsizes: 6 5 4\nendian: little\nencoding: raw\ndata file: LIST\nnone\n")])
+def test_packed_and_detached_data(tmp_path, capfd, name, content):
+    (tmp_path / name).write_bytes(content)
+    assert attempt(tmp_path / name, capfd) == 3
+
+
+def test_no_place_for_temporary_files(tmp_path, capfd, monkeypatch):
+    def full():
+        raise OSError(errno.ENOSPC, "No space left on device")
+    make_gzip_nrrd(tmp_path / "a.nrrd")
+    monkeypatch.setattr(image, "tempfile", types.SimpleNamespace(TemporaryFile=full))
+    assert run_here(image2vdb, tmp_path / "a.nrrd", tmp_path / "o.vdb") == 1  # the image is not damaged
+    assert "TMPDIR names another folder" in capfd.readouterr().err
+
+
+def test_damaged_descriptions_and_slices(tmp_path, capfd):
+    text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image'
+    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
+    assert attempt(tmp_path / "a.ome.tif", capfd) == 3
+    folder = dicom(tmp_path / "series", ramp(), tool=("dcmcrle",))
+    cut = folder / "s2.dcm"
+    cut.write_bytes(cut.read_bytes()[:-30])
+    assert attempt(folder, capfd) == 3
 
 
 def test_unknown_files(tmp_path, capfd):
@@ -265,6 +329,13 @@ def test_help_fits_on_a_screen(capfd):
 
 
 def test_memory_is_limited(tmp_path, capfd):
+    values = np.zeros((64, 300, 300), "u2")
+    values[50:60] = 7
+    np.save(tmp_path / "b.npy", values)  # larger than the limit, and read in slabs
+    assert run_here(image2vdb, tmp_path / "b.npy", tmp_path / "b.vdb", "--max-memory", "10MB") == 0
+    assert "900000 active voxels" in capfd.readouterr().err
+    (tmp_path / "b.npy").unlink()
+    (tmp_path / "b.vdb").unlink()
     np.save(tmp_path / "a.npy", np.zeros((16, 400, 400), "f4"))
     assert run_here(image2vdb, tmp_path / "a.npy", tmp_path / "o.vdb", "--max-memory", "1M") == 5
     assert "--max-memory" in capfd.readouterr().err

@@ -9,6 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
+import esvr
 from esvr.images import image2vdb, vdb2image
 from esvr.images.image import LPS_TO_RAS
 
@@ -175,6 +176,22 @@ def test_mrc_axes_and_starts_by_mrcfile(tmp_path):
     assert np.allclose(made.matrix[:3, 3], [7 * 2.0, 6 * 0.75, 5 * 0.5])
 
 
+def test_oblique_cells_by_mrcfile(tmp_path):
+    mrcfile = pytest.importorskip("mrcfile")
+    with mrcfile.new(tmp_path / "a.mrc") as file:
+        file.set_data(ramp("f4"))
+        file.set_extended_header(np.zeros(77, "V16"))
+        file.voxel_size = (1, 2, 3)
+        file.header.cellb = (80, 95, 110)
+    sides = convert(tmp_path / "a.mrc", "--unit", "angstrom").matrix[:3, :3]
+    assert np.allclose(sides.T @ sides, np.outer([1, 2, 3], [1, 2, 3]) * np.cos(np.radians([[0, 110, 95], [110, 0, 80], [95, 80, 0]])))
+    assert run_here(image2vdb, tmp_path / "a.mrc", tmp_path / "a.vdb") == 0
+    assert run_here(vdb2image, tmp_path / "a.vdb", tmp_path / "b.mrc") == 0
+    with mrcfile.open(tmp_path / "b.mrc") as file:
+        assert np.array_equal(file.data, ramp())
+        assert np.allclose([float(file.header.cellb[name]) for name in ("alpha", "beta", "gamma")], [80, 95, 110], atol=1e-3)
+
+
 # -- TIFF by tifffile, GDAL and Pillow -----------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"])
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -234,6 +251,51 @@ def test_ome_by_tifffile(tmp_path, axes):
     assert np.allclose(made.spacing, [0.2, 0.25, 1.0])
     grids = convert_all(tmp_path / "a.ome.tif", "--channel", "all", *words)
     assert [made.grid.name for made in grids] == ["DAPI", "GFP"]
+
+
+def test_volumes_in_tiles_by_tifffile(tmp_path):
+    values = ramp("u2", (40, 35, 20))
+    pytest.importorskip("tifffile").imwrite(tmp_path / "a.tif", values, tile=(16, 16, 16), photometric="minisblack")
+    same(convert(tmp_path / "a.tif"), values)
+
+
+def test_colors_of_slices_by_tifffile(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    colors = np.stack([ramp(), ramp() + 1000, ramp() + 2000], axis=-1)
+    tifffile.imwrite(tmp_path / "a.tif", colors, photometric="rgb")
+    tifffile.imwrite(tmp_path / "b.tif", np.moveaxis(colors, -1, 1), photometric="rgb", planarconfig="separate")
+    same(convert(tmp_path / "a.tif", "--channel", 1), ramp() + 1000)
+    same(convert(tmp_path / "b.tif", "--channel", 1), ramp() + 1000)
+
+
+def test_pyramids_and_images_of_ome_by_tifffile(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    values, other = ramp("u2", (64, 64, 4)), ramp("f4", (8, 7, 3))
+    with tifffile.TiffWriter(tmp_path / "a.ome.tif", ome=True) as file:
+        file.write(values, subifds=1, photometric="minisblack", metadata={"axes": "ZYX", "PhysicalSizeX": 0.5, "PhysicalSizeZ": 2})
+        file.write(values[:, ::2, ::2], subfiletype=1, photometric="minisblack")
+        file.write(other, photometric="minisblack", metadata={"axes": "ZYX", "PhysicalSizeX": 3, "PhysicalSizeZ": 4})
+    with pytest.raises(esvr.UsageError, match="2 images"):
+        convert(tmp_path / "a.ome.tif")
+    for dataset, expected, spacing in (("0", values, [0.5, 0.5, 2]), ("1", other, [3, 3, 4])):
+        made = convert(tmp_path / "a.ome.tif", "--dataset", dataset, "--unit", "um")
+        same(made, expected)
+        assert np.allclose(made.spacing, spacing)
+
+
+def test_ome_in_two_files_by_tifffile(tmp_path):
+    tifffile = pytest.importorskip("tifffile")
+    for c in range(2):
+        planes = "".join(f'<TiffData IFD="{z}" FirstZ="{z}" FirstC="{k}" PlaneCount="1"><UUID FileName="c{k}.ome.tif">urn:uuid:{k}'
+                         "</UUID></TiffData>" for k in range(2) for z in range(4))
+        text = (f'<?xml version="1.0" encoding="UTF-8"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06" UUID="urn:uuid:{c}">'
+                '<Image ID="Image:0"><Pixels ID="Pixels:0" DimensionOrder="XYZCT" Type="uint16" SizeX="6" SizeY="5" SizeZ="4" SizeC="2" '
+                f'SizeT="1">{planes}</Pixels></Image></OME>')
+        tifffile.imwrite(tmp_path / f"c{c}.ome.tif", ramp() + 1000 * c, description=text, metadata=None, photometric="minisblack")
+    same(convert(tmp_path / "c0.ome.tif", "--channel", 1), ramp() + 1000)
+    (tmp_path / "c1.ome.tif").unlink()
+    with pytest.raises(esvr.BadInput, match="c0.ome.tif"):
+        convert(tmp_path / "c0.ome.tif", "--channel", 1)
 
 
 @pytest.mark.parametrize("options", [["COMPRESS=LZW"], ["COMPRESS=LZW", "PREDICTOR=2"], ["COMPRESS=DEFLATE", "TILED=YES"],
@@ -300,6 +362,47 @@ def test_vti_by_vtk(tmp_path, mode, compressor):
     writer.SetCompressorType({"none": 0, "zlib": 1, "lz4": 2, "lzma": 3}[compressor])
     writer.Write()
     same(convert(tmp_path / "a.vti"), ramp(), matrix)
+
+
+def test_pieces_of_vti_by_vtk(tmp_path):
+    xml = pytest.importorskip("vtkmodules.vtkIOXML")
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    image = vtkImageData()
+    image.SetExtent(3, 8, 0, 4, -2, 1)
+    image.SetSpacing(0.5, 0.75, 2)
+    image.SetOrigin(1, 2, 3)
+    array = numpy_to_vtk((ramp() % 100).astype("i1").ravel(), deep=True)
+    array.SetName("s")
+    image.GetPointData().AddArray(array)
+    writer = xml.vtkXMLImageDataWriter()
+    writer.SetFileName(str(tmp_path / "a.vti"))
+    writer.SetInputData(image)
+    writer.SetNumberOfPieces(3)
+    writer.Write()
+    made = convert(tmp_path / "a.vti")
+    same(made, ramp() % 100)
+    assert np.allclose(made.matrix[:3, 3], [2.5, 2, -1])
+
+
+@pytest.mark.parametrize("is_packed", [False, True])
+def test_metaimage_by_vtk(tmp_path, monkeypatch, is_packed):
+    io = pytest.importorskip("vtkmodules.vtkIOImage")
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    monkeypatch.chdir(tmp_path)
+    image = vtkImageData()
+    image.SetDimensions(6, 5, 4)
+    image.SetSpacing(0.5, 0.75, 2)
+    image.SetOrigin(1, 2, 3)
+    array = numpy_to_vtk(ramp("i2").ravel(), deep=True)
+    image.GetPointData().SetScalars(array)
+    writer = io.vtkMetaImageWriter()
+    writer.SetInputData(image)
+    writer.SetFileName("a.mhd")
+    writer.SetCompression(is_packed)
+    writer.Write()
+    same(convert(tmp_path / "a.mhd"), ramp(), LPS_TO_RAS @ [[0.5, 0, 0, 1], [0, 0.75, 0, 2], [0, 0, 2, 3], [0, 0, 0, 1]])
 
 
 # -- HDF5 and netCDF -----------------------------------------------------------------------------------------------------
@@ -385,6 +488,19 @@ def test_zarr_by_xarray(tmp_path):
         "y", np.arange(5) * 0.75, {"units": "mm"}), "z": ("z", np.arange(4) * 2.0, {"units": "mm"})})
     data.to_zarr(tmp_path / "a.zarr")
     same(convert(tmp_path / "a.zarr"), ramp(), np.diag([0.5, 0.75, 2, 1]))
+
+
+def test_packed_zarr_by_xarray(tmp_path):
+    pytest.importorskip("zarr")
+    xarray = pytest.importorskip("xarray")
+    values = 250 + ramp("f8") / 10
+    values[:, 0] = np.nan
+    xarray.Dataset({"t": (("z", "y", "x"), values)}).to_zarr(tmp_path / "a.zarr", encoding={
+        "t": {"dtype": "i2", "scale_factor": 0.1, "add_offset": 250.0, "_FillValue": -32767}})
+    made = convert(tmp_path / "a.zarr")
+    again = xarray.open_zarr(tmp_path / "a.zarr")["t"].values
+    assert made.missing == 24 and np.array_equal(made.active, ~np.isnan(again))
+    assert np.allclose(made.values[made.active], again[made.active])
 
 
 def test_zarr_zip_by_zarr(tmp_path):

@@ -277,6 +277,20 @@ def test_integers_with_holes_come_back_as_netcdf(tmp_path):
     assert np.array_equal(again.compressed(), (ramp("i8") + 2 ** 60)[ramp() != 5])
 
 
+@pytest.mark.parametrize("ending", ["nii", "nrrd", "mha", "vti", "npy", "nc", "ome.tif", "mrc"])
+def test_labels_masks_and_doubles_come_back(tmp_path, ending):
+    for values in (ramp("u4") + np.uint32(2 ** 31), ramp("u8") + np.uint64(2 ** 61), ramp("f8") / 3, ramp() > 200, np.zeros((4, 5, 6), "u1")):
+        np.save(tmp_path / "a.npy", values)
+        words = ["--as", "double"] if values.dtype == "f8" else []
+        assert run_here(image2vdb, tmp_path / "a.npy", tmp_path / "a.vdb", "-f", *words) == 0
+        code = run_here(vdb2image, tmp_path / "a.vdb", tmp_path / f"b.{ending}", "-f")
+        if values.itemsize >= (8 if values.dtype != "f8" and ending == "ome.tif" else 4 if ending == "mrc" else 99):
+            assert code == 2  # the format has no such type
+            continue
+        made = convert(tmp_path / f"b.{ending}", *words)
+        assert code == 0 and np.array_equal(made.values.astype(values.dtype), values)
+
+
 @pytest.mark.parametrize("ending", ["nii.gz", "nrrd", "mha"])
 def test_a_scan_comes_back_in_other_formats(tmp_path, ending):
     folder = dicom(tmp_path / "s", ramp("i2") - 500)

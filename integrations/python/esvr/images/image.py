@@ -4,9 +4,14 @@ A reader makes an Image, whose axes have the order of the file. image2vdb choose
 whose axes are x, y, z (and the components of vectors). World coordinates are RAS (x to the right, y to the front, z up in
 a patient) in every format that has a patient, and those of the file in all others.
 """
+import bz2
 import contextlib
 import importlib
+import math
+import os
 import re
+import tempfile
+import zlib
 from dataclasses import dataclass, field
 from typing import Callable, Optional
 
@@ -150,10 +155,12 @@ def natural(name):
 
 
 def product(numbers):
-    result = 1
-    for n in numbers:
-        result *= int(n)
-    return result
+    return math.prod(int(n) for n in numbers)
+
+
+def by(shape):
+    """A size as text, the fastest axis first."""
+    return " x ".join(str(n) for n in shape[::-1])
 
 
 def require_shape(path, shape):
@@ -164,15 +171,103 @@ def require_shape(path, shape):
         raise esvr.BadInput(f"{path} is too large or damaged: its size is {' x '.join(map(str, shape))}")
 
 
+# -- numbers in files ----------------------------------------------------------------------------------------------
+# Functions for Image.fetch: of an index with an integer or a slice for each axis, the slowest axis first, they return the part.
+MOST_DEFLATED = 1032  # by what zlib makes bytes fewer at most
+CHUNK = 1 << 20
+
+
+def mapped(path, dtype, shape, offset=0, file=None):
+    """Numbers that lie one after the other in a file. A part is mapped only while it is copied, so that neither the memory nor
+    the number of open files grows."""
+    dtype, shape = np.dtype(dtype), tuple(int(n) for n in shape)
+    require_shape(path, shape)
+    there = os.fstat(file.fileno()).st_size if file else os.path.getsize(path)
+    require_bytes(path, product(shape) * dtype.itemsize, there - offset, f"an array of {by(shape)} {dtype.name}")
+    return lambda index: np.array(np.memmap(file or path, dtype, "r", offset, shape)[index], dtype.newbyteorder("="))
+
+
+def unpacked(path, dtype, shape, offset=0, skip=0, method="deflate"):
+    """As mapped(), of numbers that zlib, gzip or bzip2 has made smaller: they are unpacked into a temporary file. skip is a
+    number of bytes after unpacking."""
+    needed = product(shape) * np.dtype(dtype).itemsize + skip
+    with open(path, "rb") as source:
+        source.seek(offset)
+        if method == "deflate":
+            require_bytes(path, needed / MOST_DEFLATED, os.path.getsize(path) - offset, "the compressed array, at the least,")
+        unzipped = bz2.BZ2File(source) if method == "bzip2" else None
+        with writing_temporary(path):
+            file = tempfile.TemporaryFile()
+        for piece in iter(lambda: unzipped.read(CHUNK), b"") if unzipped else inflated(source):
+            with writing_temporary(path):  # pieces behind the array are read for the checksum at the end
+                file.write(piece[:needed - file.tell()])
+                file.flush()
+    return mapped(path, dtype, shape, skip, file)
+
+
+@contextlib.contextmanager
+def writing_temporary(path):
+    """Tells errors of the temporary file from those of the input."""
+    try:
+        yield
+    except OSError as error:
+        raise esvr.Error(f"{path} is unpacked into a temporary file, which cannot be written: {error.strerror or error} "
+                         "(TMPDIR names another folder)") from error
+
+
+def inflated(file):
+    """The pieces of a stream of zlib or gzip, also of one of several members."""
+    inflater, data = zlib.decompressobj(wbits=47), file.read(CHUNK)
+    while data:
+        yield inflater.decompress(data, CHUNK)
+        data = inflater.unconsumed_tail or inflater.unused_data or file.read(CHUNK)
+        if inflater.eof and data.strip(b"\0"):
+            inflater = zlib.decompressobj(wbits=47)
+        elif inflater.eof:
+            return
+    raise EOFError("the compressed data end early")
+
+
+def is_gzip(path):
+    with open(path, "rb") as file:
+        return file.read(2) == b"\x1f\x8b"
+
+
+def head_of(path, count):
+    """The first bytes of a file, or of what gzip has packed into it; none if that is damaged."""
+    with open(path, "rb") as file, contextlib.suppress(zlib.error, EOFError):
+        return next(inflated(file), b"")[:count] if is_gzip(path) else file.read(count)
+    return b""
+
+
+def whole_or_packed(path, dtype, shape, offset):
+    return unpacked(path, dtype, shape, 0, offset) if is_gzip(path) else mapped(path, dtype, shape, offset)
+
+
+def planes(leading, read):
+    """An array whose leading axes are those of planes: read(number, index) returns a part of one."""
+    def fetch(index, axes=tuple(leading), first=0):
+        if not axes:
+            return read(first, tuple(index))
+        below = product(axes[1:])
+        if isinstance(index[0], slice):
+            return np.stack([fetch(index[1:], axes[1:], first + k * below) for k in range(*index[0].indices(axes[0]))])
+        return fetch(index[1:], axes[1:], first + int(index[0]) * below)
+    return fetch
+
+
+def in_memory(array):
+    return lambda index: array[index]
+
+
 # -- images --------------------------------------------------------------------------------------------------------
 @dataclass
 class Image:
     """An image of a file.
 
-    fetch(index) returns the stored numbers of a part, with an integer or a slice for each axis; it may return a masked array
-    for missing voxels. missing(numbers) says which other ones are missing. A calibrated value is scale[0] * number +
-    scale[1]. affine is the matrix of the axes x, y, z, in `unit`; without a unit, the file does not say what its lengths
-    are.
+    fetch(index) returns the stored numbers of a part, with an integer or a slice for each axis. missing(numbers) says which
+    of them are missing (None: none). A calibrated value is scale[0] * number + scale[1]. affine is the matrix of the axes
+    x, y, z, in `unit`; without a unit, the file does not say what its lengths are.
     """
     format: str
     path: object
@@ -218,63 +313,32 @@ class Image:
         """The axes of which one place must be chosen."""
         return [axis for axis in self.axes if axis.kind not in SPACE and axis.kind != VECTOR]
 
-    def select(self, chosen):
-        """Makes a Part with these places of the axes that are not of space."""
-        return Part(self, chosen)
-
 
 class Part:
-    """The voxels of an image at one channel and time."""
+    """The voxels of an image at one channel and time; chosen has the places of the axes that are not of space."""
 
     def __init__(self, image, chosen):
         self.image, self.chosen = image, chosen
-        kept = [axis.kind for axis in image.axes if axis.kind in SPACE or axis.kind == VECTOR and axis.kind not in chosen]
-        self.is_vector = VECTOR in kept
-        self.slab_kind = next((kind for kind in kept if kind in SPACE), "z")
+        self.kept = [axis.kind for axis in image.axes if axis.kind in SPACE or axis.kind == VECTOR and axis.kind not in chosen]
+        self.is_vector = VECTOR in self.kept
+        self.slab_kind = next((kind for kind in self.kept if kind in SPACE), "z")
         self.slab_axis = SPACE.index(self.slab_kind)
         self.slices = image.size[self.slab_axis]
-        self._order = [kept.index(kind) for kind in SPACE if kind in kept]
-        if self.is_vector:
-            self._order.append(kept.index(VECTOR))
-        self._new = [kind for kind in SPACE if kind not in kept]  # axes that the file does not have
-
-    def slab(self, first, last):
-        """The stored numbers of slices along the slab axis, with the axes x, y, z (and components)."""
-        index = []
-        for axis in self.image.axes:
-            if axis.kind in self.chosen:
-                index.append(self.chosen[axis.kind])
-            elif axis.kind == self.slab_kind:
-                index.append(slice(first, last))
-            else:
-                index.append(slice(0, axis.size))
-        numbers = self.image.fetch(tuple(index))
-        numbers = numbers.transpose(self._order)
-        if not self._new:
-            return numbers
-        # Axes of one voxel that the file does not have. expand_dims would lose the mask.
-        return numbers[tuple(np.newaxis if kind in self._new else slice(None) for kind in SPACE)]
 
     def values(self, first, last, stored=False):
-        """The values of a slab and, where voxels are missing, a mask of them (else None)."""
-        numbers = self.slab(first, last)
-        gone = None
-        if isinstance(numbers, np.ma.MaskedArray):
-            gone = np.ma.getmaskarray(numbers) if numbers.mask is not np.ma.nomask else None
-            numbers = numbers.data
+        """The values of slices along the slab axis, with the axes x, y, z (and components) and, where voxels are missing, a mask
+        of them (else None)."""
+        index = [self.chosen.get(axis.kind, slice(first, last) if axis.kind == self.slab_kind else slice(0, axis.size))
+                 for axis in self.image.axes]
+        order = [self.kept.index(kind) for kind in [*SPACE, VECTOR] if kind in self.kept]
+        numbers = self.image.fetch(tuple(index)).transpose(order)
+        numbers = np.expand_dims(numbers, [k for k, kind in enumerate(SPACE) if kind not in self.kept])
         if stored:
             return numbers, None
-        if self.image.missing is not None:
-            more = self.image.missing(numbers)
-            if more is not None:
-                gone = more if gone is None else gone | more
-        if gone is not None and self.is_vector and gone.ndim == 4:
+        gone = self.image.missing(numbers) if self.image.missing else None
+        if gone is not None and self.is_vector:
             gone = gone.any(axis=3)
         return apply_scale(numbers, self.image.scale), gone
-
-
-def is_integral(scale):
-    return all(float(number).is_integer() and abs(number) < 2 ** 31 for number in scale)
 
 
 def apply_scale(numbers, scale):
@@ -282,30 +346,14 @@ def apply_scale(numbers, scale):
     if scale is None:
         return numbers
     slope, intercept = scale
-    if numbers.dtype.kind in "iu" and numbers.dtype.itemsize <= 4 and is_integral(scale):
+    if numbers.dtype.kind in "iu" and numbers.dtype.itemsize <= 4 and all(
+            float(number).is_integer() and abs(number) < 2 ** 31 for number in scale):
         return numbers.astype(np.int64) * int(slope) + int(intercept)
     return numbers.astype(np.float64) * slope + intercept
-
-
-def values_equal(numbers, value):
-    """Which numbers are a value that a header gives as text or as a number of another type."""
-    if isinstance(value, float) and np.isnan(value):
-        return np.isnan(numbers) if numbers.dtype.kind == "f" else None
-    if numbers.dtype.kind in "iu":
-        if not float(value).is_integer():
-            return None
-        limits = np.iinfo(numbers.dtype)
-        if not limits.min <= int(value) <= limits.max:
-            return None
-        return numbers == numbers.dtype.type(int(value))
-    if numbers.dtype.kind == "f" and abs(value) <= np.finfo(numbers.dtype).max:
-        return numbers == numbers.dtype.type(value)
-    return None
 
 
 def missing_if_any(values):
     """A function for Image.missing: the voxels that have one of these values."""
     def missing(numbers):
-        found = [mask for mask in (values_equal(numbers, value) for value in values) if mask is not None]
-        return np.logical_or.reduce(found) if found else None
+        return np.logical_or.reduce([np.isnan(numbers) if value != value else numbers == value for value in values])
     return missing if values else None

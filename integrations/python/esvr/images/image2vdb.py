@@ -8,7 +8,7 @@ import numpy as np
 import esvr
 
 from . import program, read_dicom, read_science, read_tiff, read_volumes
-from .image import BRICK, TIME, VECTOR, affine_of, factor, natural, reading, unit_named
+from .image import BRICK, TIME, VECTOR, Part, affine_of, factor, head_of, natural, reading, unit_named
 from .program import Option, Program, byte_size, number
 
 EXACT = {"float": 2 ** 24, "vec3s": 2 ** 24, "double": 2 ** 53}  # up to here, grids of these types hold every whole number
@@ -39,15 +39,6 @@ def place(text):
     return text if text == "all" else count(text)
 
 
-def word_of(*words):
-    def parse(text):
-        if text not in words:
-            raise argparse.ArgumentTypeError(f"it is one of {', '.join(words)}, not '{text}'")
-        return text
-    parse.__name__ = "word"
-    return parse
-
-
 PROGRAM = Program(
     "image2vdb", "Converts an image of voxels to sparse VDB grids.",
     "  image2vdb IN... OUT.vdb [options]     IN: an image, slices in order, a folder or 'ct_####.tif'",
@@ -59,16 +50,16 @@ PROGRAM = Program(
      Option("dataset", "NAME", "HDF5, netCDF, Zarr, VTI: the array; DICOM: the series; OME-TIFF: the image"),
      Option("axes", "LETTERS", "what the axes are, the slowest first: tczyx; v for components of vectors"),
      Option("stored", "", "the stored numbers, not the calibrated values"),
-     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", word_of("auto", "float", "double", "integer", "mask"),
+     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"),
             default="auto"),
      Option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)"),
      Option("voxel-size", "S|X,Y,Z", "edges of a voxel, instead of the transform of the image", three(float)),
      Option("nonfinite", "WORD", "NaN and infinite voxels: refuse, zero or missing (refuse)",
-            word_of("refuse", "zero", "missing"), default="refuse"),
+            ("refuse", "zero", "missing"), default="refuse"),
      Option("normalise", "", "divide by the type's largest value, or by the largest of a float image"),
      Option("dims", "X,Y,Z", "RAW: number of voxels along each axis", three(int)),
      Option("type", "TYPE", "RAW: uint8, int16, float32, ..."),
-     Option("endian", "little|big", "RAW: byte order (little)", word_of("little", "big"), default="little"),
+     Option("endian", "little|big", "RAW: byte order (little)", ("little", "big"), default="little"),
      Option("skip", "BYTES", "RAW: length of a header (0)", count, default=0),
      Option("max-memory", "SIZE", "limit on the memory of the image and of the grid (4G)", byte_size, default=4 * 10 ** 9),
      Option("force", "", "replace OUT.vdb if it exists", short="f")],
@@ -79,76 +70,54 @@ PROGRAM = Program(
 
 
 # -- formats -------------------------------------------------------------------------------------------------------
+def read_one_dicom(path, options):
+    return read_dicom.read_dicom([path], options)
+
+
+TIFF, NRRD, NIFTI, MRC = read_tiff.read_tiff, read_volumes.read_nrrd, read_volumes.read_nifti, read_volumes.read_mrc
+HDF5, NETCDF, VTI, NPY = read_science.read_hdf5, read_science.read_netcdf, read_volumes.read_vti, read_volumes.read_npy
+NETCDF_NAMES = (".nc", ".nc4", ".cdf")
+BY_CONTENT = [(0, (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), TIFF), (0, (b"NRRD",), NRRD), (0, (b"\x93NUMPY",), NPY),
+              (344, (b"n+1\0", b"ni1\0"), NIFTI), (4, (b"n+2\0", b"ni2\0"), NIFTI), (208, (b"MAP ",), MRC), (0, (b"CDF",), NETCDF),
+              *((at, (b"\x89HDF\r\n\x1a\n",), HDF5) for at in (0, 512, 1024, 2048))]
+BY_NAME = {(".tif", ".tiff"): TIFF, (".nrrd", ".nhdr"): NRRD, (".nii", ".hdr", ".img"): NIFTI,
+           (".mha", ".mhd"): read_volumes.read_metaimage, (".mrc", ".map", ".ccp4", ".rec", ".st", ".mrcs"): MRC, (".vti",): VTI,
+           (".h5", ".hdf5", ".hdf"): HDF5, NETCDF_NAMES: NETCDF, (".npy",): NPY, (".dcm",): read_one_dicom,
+           (".zarr", ".zarr.zip", ".ozx"): read_science.read_zarr}
+
+
 def format_of(path):
     """The reader of a file, by its content or else by its name."""
     with reading(path, "an image"):
-        with open(path, "rb") as file:
-            head = file.read(4096)
-            if head[:2] == b"\x1f\x8b":
-                file.seek(0)
-                from .flat import Inflated
-                try:
-                    head = Inflated(file).read(4096)
-                except Exception:  # the reader says what is wrong
-                    head = b""
-    name = os.fspath(path).lower()
-    name = name.removesuffix(".gz")
-    if head[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
-        return read_tiff.read_tiff
-    if head[:4] == b"NRRD":
-        return read_volumes.read_nrrd
-    if head[:6] == b"\x93NUMPY":
-        return read_volumes.read_npy
-    if head[344:348] in (b"n+1\0", b"ni1\0") or head[4:8] in (b"n+2\0", b"ni2\0"):
-        return read_volumes.read_nifti
-    if head[208:212] == b"MAP ":
-        return read_volumes.read_mrc
-    if read_dicom.is_dicom(path):
-        return lambda path, options: read_dicom.read_dicom([path], options)
-    if head[:3] == b"CDF":
-        return read_science.read_netcdf
-    if any(head[at:at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048)):
-        return read_science.read_netcdf if name.endswith((".nc", ".nc4", ".cdf")) else read_science.read_hdf5
+        head = head_of(path, 4096)
+        if read_dicom.is_dicom(path):
+            return read_one_dicom
+    name = os.fspath(path).lower().removesuffix(".gz")
+    for at, words, reader in BY_CONTENT:
+        if head[at:].startswith(words):
+            return NETCDF if reader is HDF5 and name.endswith(NETCDF_NAMES) else reader
     if b"<VTKFile" in head:
-        return read_volumes.read_vti
-    by_name = {(".tif", ".tiff"): read_tiff.read_tiff, (".nrrd", ".nhdr"): read_volumes.read_nrrd,
-               (".nii", ".hdr", ".img"): read_volumes.read_nifti, (".mha", ".mhd"): read_volumes.read_metaimage,
-               (".mrc", ".map", ".ccp4", ".rec", ".st", ".mrcs"): read_volumes.read_mrc, (".vti",): read_volumes.read_vti,
-               (".h5", ".hdf5", ".hdf"): read_science.read_hdf5, (".nc", ".nc4", ".cdf"): read_science.read_netcdf,
-               (".npy",): read_volumes.read_npy}
-    for endings, reader in by_name.items():
-        if name.endswith(endings):
-            return reader
-    if name.endswith((".zarr", ".zarr.zip", ".ozx")):
-        return read_science.read_zarr
-    if name.endswith(".dcm"):
-        raise esvr.BadInput(f"{path} cannot be read as DICOM: it has no header of this format")
-    return read_volumes.read_raw
+        return VTI
+    return next((reader for endings, reader in BY_NAME.items() if name.endswith(endings)), read_volumes.read_raw)
 
 
 def open_image(paths, options):
     """The image of a file, of slices, or of a folder."""
     paths = [os.fspath(path) for path in paths]
-    if len(paths) == 1 and not os.path.exists(paths[0]):
-        pattern = read_tiff.files_of_pattern(paths[0])
-        if pattern is None:
-            raise esvr.BadInput(f"{paths[0]} cannot be read: No such file or directory")
-        return read_tiff.read_stack(pattern, options)
     if len(paths) == 1 and os.path.isdir(paths[0]):
         return open_folder(paths[0], options)
+    if len(paths) == 1 and not os.path.exists(paths[0]):
+        paths = read_tiff.files_of_pattern(paths[0]) or paths
     for path in paths:
         if not os.path.isfile(path):
             raise esvr.BadInput(f"{path} cannot be read: No such file")
     reader = format_of(paths[0])
     if len(paths) > 1:
-        if all(map(read_dicom.is_dicom, paths)):
-            return read_dicom.read_dicom(paths, options)
-        if reader is not read_tiff.read_tiff:
+        if reader not in (TIFF, read_one_dicom):
             raise esvr.UsageError(f"several files make one image only if they are TIFF or DICOM, and {paths[0]} is not")
-        return read_tiff.read_stack(paths, options)
-    if options.dims or options.type:
-        if reader is not read_volumes.read_raw:
-            raise esvr.UsageError(f"--dims and --type are for RAW images only, and {paths[0]} has a format of its own")
+        return read_tiff.read_stack(paths, options) if reader is TIFF else read_dicom.read_dicom(paths, options)
+    if (options.dims or options.type) and reader is not read_volumes.read_raw:
+        raise esvr.UsageError(f"--dims and --type are for RAW images only, and {paths[0]} has a format of its own")
     return reader(paths[0], options)
 
 
@@ -195,7 +164,7 @@ def chosen_parts(image, options):
     fixed = {kind: numbers[0] for kind, numbers in places.items()}
     for time in places.get(TIME, [0]):
         here = {**fixed, **({TIME: time} if times else {})}
-        yield time, [(name, image.select(here if k is None else {**here, channels.kind: k})) for name, k in zip(names, selected)]
+        yield time, [(name, Part(image, here if k is None else {**here, channels.kind: k})) for name, k in zip(names, selected)]
 
 
 def channel_names(axis, selected, name):
@@ -269,14 +238,13 @@ def grid_type(part, options):
 def slab_slices(part, options):
     """How many slices are read at once: a multiple of 8 that keeps to the memory."""
     image = part.image
-    slice_bytes = np.prod(image.size, dtype=float) / part.slices * max(image.dtype.itemsize, 4) * 3
-    slice_bytes *= image.components if part.is_vector else 1
-    if slice_bytes * BRICK > options.max_memory:
-        raise esvr.MemoryExceeded(f"{image.path}: {BRICK} slices of the image ask for {slice_bytes * BRICK:.3g} bytes of memory, "
-                                  f"and {options.max_memory} are allowed")
-    fitting = int(min(SLAB_BYTES, options.max_memory / 4) / slice_bytes)
-    wanted = -(-max(image.block, 1) // BRICK) * BRICK
-    return max(BRICK, min(max(fitting // BRICK * BRICK, BRICK), max(wanted, BRICK) if image.block > 1 else BRICK * 4))
+    brick_bytes = BRICK * np.prod(image.size, dtype=float) / part.slices * max(image.dtype.itemsize, 4) * 3
+    brick_bytes *= image.components if part.is_vector else 1
+    if brick_bytes > options.max_memory:
+        raise esvr.MemoryExceeded(f"{image.path}: {BRICK} slices of the image ask for {brick_bytes:.3g} bytes of memory, and "
+                                  f"{options.max_memory} are allowed")
+    fitting = int(min(SLAB_BYTES, options.max_memory / 4) / brick_bytes)
+    return BRICK * max(1, min(fitting, -(-image.block // BRICK) if image.block > 1 else 4))
 
 
 def slabs(part, options, log):
@@ -289,19 +257,16 @@ def slabs(part, options, log):
         log.progress("reading", min(1.0, (first + step) / part.slices))
 
 
-def largest(part, options, log):
-    most = 0.0
-    for _, values, gone in slabs(part, options, log):
-        kept = values[np.isfinite(values)] if gone is None else values[np.isfinite(values) & ~gone]
-        most = max(most, float(np.abs(kept.astype(np.float64)).max(initial=0.0)))
-    return most
-
-
 def normal_of(part, options, log):
+    """By what --normalise divides: the largest value of a type of integers, or else that of the image."""
+    dtype, most = part.image.dtype, 0.0
     if not options.normalise:
         return None
-    dtype = part.image.dtype
-    most = float(np.iinfo(dtype).max) if dtype.kind in "iu" and part.image.scale is None else largest(part, options, log)
+    if dtype.kind in "iu" and part.image.scale is None:
+        return float(np.iinfo(dtype).max)
+    for _, values, gone in slabs(part, options, log):
+        kept = np.isfinite(values) if gone is None else np.isfinite(values) & ~gone
+        most = max(most, float(np.abs(values[kept].astype(np.float64)).max(initial=0.0)))
     if most == 0.0:
         raise esvr.BadInput(f"{part.image.path}: every voxel is 0, so the image cannot be normalised")
     return most
@@ -309,7 +274,6 @@ def normal_of(part, options, log):
 
 class Tally:
     missing = nonfinite = 0
-    first = None
     is_rounded = False
 
 
@@ -327,8 +291,8 @@ def convert(name, part, options, log):
             has_missing = True
         except Beyond as beyond:
             if getattr(options, "as") != "auto" or normal or part.is_vector:
-                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind].bit_length() - 1}, up to which "
-                                    f"a grid of type {kind} holds whole numbers; --as integer keeps it") from beyond
+                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind].bit_length() - 1}, up to "
+                                    f"which a grid of type {kind} holds whole numbers; --as integer keeps it") from beyond
             kind = "int32" if part.image.dtype == np.int32 and part.image.scale is None else "int64"
 
 
@@ -340,13 +304,15 @@ def pack(name, part, options, log, kind, normal, has_missing):
         metadata["length_unit"] = unit
     if image.unit:
         metadata["image_unit"] = image.unit
-    scale = 1.0 / normal if normal else 1.0
     threshold = options.threshold
+
+    def as_value(number):  # with the same rounding as voxels
+        return float(np.float32(number / normal)) if normal else number
     if has_missing and threshold is None and kind != "bool":
         metadata["image_missing"] = True  # all inactive voxels are missing
     by_builder = kind in ("float", "double", "int32", "int64")
-    builder = esvr.GridBuilder(kind, name=name, background=options.background * scale if by_builder else 0,
-                               threshold=threshold * scale if threshold is not None and by_builder else None,
+    builder = esvr.GridBuilder(kind, name=name, background=as_value(options.background) if by_builder else 0,
+                               threshold=as_value(threshold) if threshold is not None and by_builder else None,
                                grid_class="fog volume" if kind == "float" else "unknown", transform=matrix, metadata=metadata,
                                max_bytes=options.max_memory)
     for first, values, gone in slabs(part, options, log):
@@ -379,7 +345,8 @@ def converted(values, kind, part, tally, first, gone, options):
     if kind in ("int32", "int64"):
         inside = values if gone is None else values[~gone]
         if values.dtype == np.uint64 and inside.size and int(inside.max()) > 2 ** 63 - 1:
-            raise esvr.BadInput(f"{part.image.path}: the value {inside.max()} is beyond 2^63 - 1, the largest that an Int64 grid holds")
+            raise esvr.BadInput(f"{part.image.path}: the value {inside.max()} is beyond 2^63 - 1, the largest that an Int64 grid "
+                                "holds")
         return values.astype(kind), gone
     if values.dtype.kind in "iu" and values.dtype.itemsize > 2:
         inside = values if gone is None else values[~gone]
@@ -400,28 +367,20 @@ def finite(values, kind, part, tally, first, gone, options):
     exact, values = values, values.astype(np.float64 if kind == "double" else np.float32, copy=False)
     if part.image.scale is None and values.dtype.itemsize < exact.dtype.itemsize:
         tally.is_rounded = tally.is_rounded or bool(np.any((values != exact) & np.isfinite(exact)))
-    bad = ~np.isfinite(values)
-    if gone is not None:
-        bad &= ~(gone if values.ndim == 3 else gone[..., np.newaxis])
-    if bad.any():
-        if options.nonfinite == "missing":
-            bad = bad.any(axis=3) if bad.ndim == 4 else bad
-            gone = bad if gone is None else gone | bad
-        else:
-            refuse_nonfinite(part, tally, first, bad, options)
-    if gone is not None or bad.any():
-        values = np.where(np.isfinite(values), values, values.dtype.type(0))
-    return values, gone
-
-
-def refuse_nonfinite(part, tally, first, bad, options):
-    tally.nonfinite += int(bad.sum())
-    if tally.first is None:
-        at = [int(n) for n in np.argwhere(bad)[0][:3]]
+    good = np.isfinite(values)
+    if good.all():
+        return values, gone
+    bad = ~good if gone is None else ~(good | (gone if values.ndim == 3 else gone[..., np.newaxis]))
+    bad = bad.any(axis=3) if values.ndim == 4 else bad
+    if options.nonfinite == "refuse" and bad.any():
+        at = [int(n) for n in np.argwhere(bad)[0]]
         at[part.slab_axis] += first
-        tally.first = tuple(at)
-    if options.nonfinite == "refuse":
-        raise esvr.BadInput(f"{part.image.path}: the voxel {tally.first} is not finite (--nonfinite zero replaces such voxels by 0)")
+        raise esvr.BadInput(f"{part.image.path}: the voxel {tuple(at)} is not finite (--nonfinite zero replaces such voxels by 0)")
+    if options.nonfinite == "missing":
+        gone = bad if gone is None else gone | bad
+    else:
+        tally.nonfinite += int(bad.sum())
+    return np.where(good, values, values.dtype.type(0)), gone
 
 
 # -- the program ---------------------------------------------------------------------------------------------------
@@ -441,8 +400,8 @@ def work(arguments):
     *inputs, out = arguments.files
     is_sequence = arguments.time == "all"
     if is_sequence and program.frame_path(out, 0) == out:
-        raise esvr.UsageError(f"--time all writes a file for each time, whose name must have a place for its number, as OUT.####.vdb, "
-                              f"and {out} has none")
+        raise esvr.UsageError("--time all writes a file for each time, whose name must have a place for its number, as "
+                              f"OUT.####.vdb, and {out} has none")
     program.check_output(program.frame_path(out, 0) if is_sequence else out, (".vdb", ".nvdb"), arguments.force, inputs)
     log = program.Log(PROGRAM.name, arguments)
 

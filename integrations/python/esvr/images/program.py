@@ -16,7 +16,7 @@ import sys
 import textwrap
 import traceback
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import esvr
 
@@ -27,14 +27,14 @@ CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.
 
 @dataclass
 class Option:
-    """An option of a program. Without a name for its value it is a switch; with a kind, its text is converted."""
+    """An option of a program. Without a name for its value it is a switch; kind converts its text, or has the texts that it
+    may be."""
     name: str
     value: str
     text: str
     kind: object = str
     short: str = ""
     default: object = None
-    repeated: bool = False
 
     def title(self):
         names = f"-{self.short}, --{self.name}" if self.short else f"--{self.name}"
@@ -56,8 +56,6 @@ class Program:
     options: list
     notes: str
     examples: str
-    arguments: str = "files"
-    texts: dict = field(default_factory=dict)  # further topics of --help
 
     # -- help ------------------------------------------------------------------------------------------------------
     def help(self):
@@ -100,11 +98,9 @@ class Program:
                           ".SH NOTES", notes, *exact("EXAMPLES", self.examples)]) + "\n"
 
     def topic(self, name):
-        if name == "man":
-            return self.man_page()
         if name == "options":
             return "".join(f"--{option.name}\n" for option in self.options + COMMON)
-        return self.texts.get(name, self.help)() if name in self.texts else self.help()
+        return self.man_page() if name == "man" else self.help()
 
     # -- arguments -------------------------------------------------------------------------------------------------
     def parse(self, words):
@@ -115,9 +111,10 @@ class Program:
             names = [f"--{option.name}"] + ([f"-{option.short}"] if option.short else [])
             if not option.value:
                 parser.add_argument(*names, action="store_true")
+            elif isinstance(option.kind, tuple):
+                parser.add_argument(*names, choices=option.kind, default=option.default)
             else:
-                parser.add_argument(*names, type=option.kind, default=[] if option.repeated else option.default,
-                                    action="append" if option.repeated else "store", metavar=option.value)
+                parser.add_argument(*names, type=option.kind, default=option.default)
         arguments = parser.parse_intermixed_args(words)
         if arguments.help:
             sys.stdout.write(self.topic(arguments.files[0] if arguments.files else ""))
@@ -340,18 +337,20 @@ def main(program, work):
         return exit_code(error)
 
 
-FRAME_MARK = re.compile(r"#+|%0?\d*d|\$F\d*")
+def number_mark(name):
+    """The place of a number in a name (####, @@@@, %04d or $F4) as a match, and its digits; None and 0 if there is none."""
+    match = re.search(r"#+|@+|%0?\d*d|\$F\d*", name)
+    if not match:
+        return None, 0
+    mark = match[0]
+    return match, 4 if mark == "#" else len(mark) if mark[0] in "#@" else int(re.sub(r"\D", "", mark) or 1)
 
 
 def frame_path(path, number):
-    """The file of a number, if the name has a place for it (####, %04d or $F4)."""
+    """The file of a number, if the name has a place for it."""
     folder, name = os.path.split(os.fspath(path))
-    mark = FRAME_MARK.search(name)
-    if not mark:
-        return path
-    text = mark[0]
-    digits = 4 if text == "#" else len(text) if text[0] == "#" else int(re.sub(r"\D", "", text) or 1)
-    return os.path.join(folder, f"{name[:mark.start()]}{number:0{digits}d}{name[mark.end():]}")
+    mark, digits = number_mark(name)
+    return os.path.join(folder, f"{name[:mark.start()]}{number:0{digits}d}{name[mark.end():]}") if mark else path
 
 
 def check_output(path, extensions, overwrite, inputs=()):

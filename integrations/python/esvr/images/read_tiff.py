@@ -1,28 +1,28 @@
-"""Readers of TIFF: OME-TIFF, ImageJ, tifffile's own and plain stacks, in one file or a file for each slice."""
+"""Readers of TIFF: OME-TIFF, ImageJ, SCIFIO, tifffile's own and plain stacks, in one file or a file for each slice."""
 import os
 import re
 import xml.etree.ElementTree as tree
+from types import SimpleNamespace
 
 import numpy as np
 
 import esvr
 
-from .flat import Flat, Joined
-from .image import CHANNEL, TIME, Axis, Image, affine_of, affine_of_steps, axes_from_letters, factor, kind_named, missing_if_any, \
-    natural, need, product, reading, require_bytes, unit_named
+from .image import CHANNEL, TIME, Axis, Image, affine_of, affine_of_steps, axes_from_letters, by, factor, kind_named, mapped, \
+    missing_if_any, natural, need, planes, product, reading, require_bytes, unit_named
+from .program import number_mark
 
 TIFF_AXES = {"X": "x", "Y": "y", "Z": "z", "C": CHANNEL, "S": "sample", "T": TIME, "Q": "page", "I": "page"}
 RESOLUTION_UNITS = {2: "in", 3: "cm"}
 
 
+# -- a file for each slice -----------------------------------------------------------------------------------------
 def files_of_pattern(text):
     """The files of a pattern like 'ct_####.tif', in the order of their numbers; None if it is no pattern."""
     folder, name = os.path.split(text)
-    match = re.search(r"#+|@+|%0?\d*d|\$F\d*", name)
+    match, digits = number_mark(name)
     if not match:
         return None
-    mark = match[0]
-    digits = 4 if mark == "#" else len(mark) if mark[0] in "#@" else int(re.sub(r"\D", "", mark) or 1)
     before, after = re.escape(name[:match.start()]), re.escape(name[match.end():])
     found = {}
     for entry in os.listdir(folder or "."):
@@ -46,10 +46,7 @@ def files_of_pattern(text):
 
 def read_stack(paths, options):
     """A file for each slice. A file of several slices among them makes one longer stack."""
-    images = []
-    for path in paths:
-        images.append(read_tiff(path, options))
-        images[-1].fetch.file.filehandle.close()  # a process may open some 1,000 files
+    images = [read_tiff(path, options) for path in paths]
     first = images[0]
     if len(images) == 1:
         return first
@@ -62,10 +59,16 @@ def read_stack(paths, options):
             raise esvr.BadInput(f"{image.path} has other axes than {first.path}")
         if image.scale != first.scale or not np.allclose(image.affine, first.affine) or image.unit != first.unit:
             raise esvr.BadInput(f"{image.path} has another pixel size or calibration than {first.path}")
-    axes = [axis for axis in first.axes if axis.kind != "z"]
-    parts = [Slices(image) for image in images]
-    stack = Image("TIFF", first.path, [Axis("z", sum(part.shape[0] for part in parts))] + axes, first.dtype, Joined(parts),
-                  first.affine, first.unit, first.scale, first.missing, warnings=list(first.warnings))
+    slices = [(image, z) for image in images for z in range(image.size[2])]
+
+    def read(number, index):
+        image, z = slices[number]
+        kinds, index = [axis.kind for axis in image.axes], list(index)
+        if "z" in kinds:
+            index.insert(kinds.index("z"), z)
+        return image.fetch(tuple(index))
+    stack = Image("TIFF", first.path, [Axis("z", len(slices)), *(axis for axis in first.axes if axis.kind != "z")], first.dtype,
+                  planes([len(slices)], read), first.affine, first.unit, first.scale, first.missing, warnings=first.warnings)
     if first.unit and not any("distance" in text for text in stack.warnings) and first.axis("z") is None:
         stack.warnings.append("the distance of slices is not in the files, and is taken to be the edge of a pixel or 1")
     if [os.fspath(p) for p in paths] != sorted(map(os.fspath, paths), key=natural):
@@ -73,98 +76,79 @@ def read_stack(paths, options):
     return stack
 
 
-class Slices:
-    """The fetch of an image with z as its first axis."""
-
-    def __init__(self, image):
-        self.image, self.kinds = image, [axis.kind for axis in image.axes]
-        self.at = self.kinds.index("z") if "z" in self.kinds else None
-        self.shape = (image.size[2],) + tuple(axis.size for axis in image.axes if axis.kind != "z")
-
-    def __call__(self, index):
-        if self.at is None:
-            part = self.image.fetch(tuple(index[1:]))
-            return part[np.newaxis] if isinstance(index[0], slice) else part
-        rest = list(index[1:])
-        rest.insert(self.at, index[0])
-        part = self.image.fetch(tuple(rest))
-        if isinstance(index[0], slice):
-            before = sum(isinstance(i, slice) for i in rest[:self.at])
-            part = np.moveaxis(part, before, 0)
-        return part
-
-
 # -- one file ------------------------------------------------------------------------------------------------------
 def read_tiff(path, options):
     tifffile = need("tifffile", "python3-tifffile", path, "TIFF")
     with reading(path, "TIFF"):
         file = tifffile.TiffFile(path)
-        page = file.pages.first
-        series = series_of(path, file, options.dataset)
-        shape, letters = series.shape, series.axes
+        if "openmicroscopy.org" in (file.pages.first.description or "") and not file.is_ome:
+            raise esvr.BadInput(f"{path}: its OME-XML is damaged")
+        series, number = series_of(path, file, options.dataset)
+        page = next((page.keyframe for page in series.pages if page is not None), file.pages.first)
         if page.dtype is None:
             raise esvr.BadInput(f"{path} has {page.bitspersample} bits a sample, in a form that is not read")
+        letters = series.axes
         if file.is_imagej and not is_scifio(file):
             letters = imagej_axes(file, letters)
         elif set(letters) & {"Q", "I"} and "Z" not in letters:
-            letters = letters.replace("Q", "Z", 1) if "Q" in letters else letters.replace("I", "Z", 1)
-        if options.axes:
-            axes = axes_from_letters(options.axes, shape, path)
-        else:
-            axes = [Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, shape)]
-        space = Space()
-        describe(path, file, page, space, options)
+            letters = letters.replace("Q" if "Q" in letters else "I", "Z", 1)
+        axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
+            Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
+        # What descriptions say of lengths and values. A distance of slices that is not known is None.
+        space = SimpleNamespace(spacing=[1.0, 1.0, 1.0], origin=[0.0, 0.0, 0.0], unit=None, scale=None, labels=[], warnings=[])
+        describe(path, file, file.pages.first, space, number, options)
         nodata = page.tags.get("GDAL_NODATA")
-        missing = missing_if_any([float(str(nodata.value).strip("\0 "))]) if nodata else None
         if space.spacing[2] is None:
             space.spacing[2] = space.spacing[0]
             if next((axis.size for axis in axes if axis.kind == "z"), 1) > 1:
                 space.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
-        image = Image("TIFF", path, axes, page.dtype, Pages(path, file, series), affine_of(space.spacing, space.origin), space.unit,
-                      space.scale, missing, warnings=space.warnings)
+        image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine_of(space.spacing, space.origin),
+                      space.unit, space.scale, missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=space.warnings)
+        file.filehandle.close()  # a process may open some 1,000 files, and a stack may have more
     if image.axis(CHANNEL) and len(space.labels) == image.axis(CHANNEL).size and any(space.labels):
         image.axis(CHANNEL).labels = space.labels
     return image
 
 
+def number_in(text):
+    text = str(text).strip("\0 ")
+    return int(text) if text.lstrip("-").isdigit() else float(text)
+
+
 def series_of(path, file, dataset):
-    """The series of the image. Pages that were written one by one are joined; of other images, --dataset names one."""
+    """The series of the image, and its number. Pages that were written one by one are joined; of other images, --dataset names
+    one."""
     if is_scifio(file):
-        return scifio_series(path, file)
+        return scifio_series(path, file), 0
     series = [s for s in file.series if s.kind not in ("thumbnail", "label", "macro")]
     first = series[0]
     if file.is_ome and first.kind != "ome":
-        return ome_series(path, file)
+        return ome_series(path, file), 0
     if dataset is not None:
         if not dataset.isdigit() or int(dataset) >= len(series):
             raise esvr.UsageError(f"{path} has {len(series)} images, and --dataset is the number of one from 0 on, not '{dataset}'")
-        return series[int(dataset)]
+        return series[int(dataset)], int(dataset)
     if len(series) == 1:
-        return first
+        return first, 0
     if all(s.shape == first.shape and s.dtype == first.dtype for s in series) and not file.is_ome:
-        return JoinedSeries(series)
+        return SimpleNamespace(pages=[page for s in series for page in s.pages], shape=(len(series), *first.shape),
+                               axes=("Q" if "Z" in first.axes else "Z") + first.axes), 0
     raise esvr.UsageError(f"{path} has {len(series)} images: " + ", ".join(
         f"{k} ({s.name + ', ' if s.name else ''}{' x '.join(map(str, s.shape))})" for k, s in enumerate(series[:8]))
         + "; name one by --dataset and its number")
 
 
-class NamedPages:
-    """Pages in the order of the planes that a description names."""
-
-    def __init__(self, pages, shape, axes):
-        self.pages, self.shape, self.axes = pages, shape, axes
-
-
 def ome_series(path, file):
-    """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the dimensions."""
-    pixels = next(e for e in tree.fromstring(file.ome_metadata).iter() if local_name(e) == "Pixels")
+    """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the
+    dimensions."""
+    pixels = ome_pixels(file)[0]
     slow_first = pixels.get("DimensionOrder", "XYCZT")[:1:-1]
     sizes = {letter: int(pixels.get(f"Size{letter}", 1)) for letter in "CZT"}
     pages = list(file.pages)
     if product(sizes.values()) != len(pages) or any(local_name(e) == "TiffData" for e in pixels):
         raise esvr.BadInput(f"{path} has {len(pages)} pages, which do not fit its OME-XML of {sizes['C']} channels of {sizes['Z']} "
                             f"slices at {sizes['T']} times")
-    return NamedPages(pages, tuple(sizes[letter] for letter in slow_first) + file.pages.first.shape, slow_first + "YX")
+    return SimpleNamespace(pages=pages, shape=tuple(sizes[letter] for letter in slow_first) + pages[0].shape, axes=slow_first + "YX")
 
 
 def is_scifio(file):
@@ -179,137 +163,80 @@ def scifio_series(path, file):
     pages, rows = list(file.pages), file.pages.first.shape
     if names[:2] != ["x", "y"] or len(names) != len(lengths) or tuple(lengths[1::-1]) != rows[:2] or \
             product(lengths[2:]) != len(pages):
-        raise esvr.BadInput(f"{path} has {len(pages)} pages of {rows[1]} x {rows[0]} pixels, and SCIFIO's axes {said['axes']} of the "
-                            f"lengths {said['lengths']}")
+        raise esvr.BadInput(f"{path} has {len(pages)} pages of {by(rows)} pixels, and SCIFIO's axes {said['axes']} of the lengths "
+                            f"{said['lengths']}")
     letters = "".join({"z": "Z", "channel": "C", "time": "T"}.get(name, "Q") for name in names[:1:-1])
-    return NamedPages(pages, tuple(lengths[:1:-1]) + rows, letters + "YXS"[:len(rows)])
+    return SimpleNamespace(pages=pages, shape=tuple(lengths[:1:-1]) + rows, axes=letters + "YXS"[:len(rows)])
 
 
-class JoinedSeries:
-    """Series of the same size as slices of one image."""
+def pages_of(path, file, series, page):
+    """The function for Image.fetch of pages, each of which is read when it is needed. page is the first of them."""
+    own = list(page.shape)  # the axes of a page as they are in the series, where axes of one place may be left out
+    while own and tuple(own) != tuple(series.shape[len(series.shape) - len(own):]) and 1 in own:
+        own.remove(1)
+    leading, inner = series.shape[:len(series.shape) - len(own)], series.shape[len(series.shape) - len(own):]
+    count = product(leading)
+    if len(series.pages) == 1 and count > 1:  # the voxels of all slices lie behind the only page, as ImageJ keeps large files
+        if page.compression != 1:
+            raise esvr.BadInput(f"{path} has one page for {count} slices, and it is compressed")
+        return mapped(path, page.dtype.newbyteorder(file.byteorder), series.shape, page.dataoffsets[0])
+    if None in series.pages or len(series.pages) < count:
+        raise esvr.BadInput(f"{path}: the pages of some of its {count} planes are missing; they may be in other files of the "
+                            "same image")
+    for p in series.pages:
+        there, ends = p.parent.filehandle.size, [at + size for at, size in zip(p.dataoffsets, p.databytecounts)]
+        if max(ends, default=0) > there:
+            raise esvr.BadInput(f"{path} is cut short: a part of the image ends at byte {max(ends)} of {there}")
+        if page.compression == 1 and all(p.databytecounts):  # a part of no bytes is one of GDAL's voxels without data
+            require_bytes(path, product(page.shape) * (page.bitspersample or 8) // 8, sum(p.databytecounts), "a page")
 
-    def __init__(self, series):
-        self.series = series
-        self.shape, self.axes = (len(series),) + series[0].shape, "Z" + series[0].axes
-        self.pages = [page for s in series for page in s.pages]
-        self.keyframe = series[0].keyframe
-        if "Z" in series[0].axes:
-            self.axes = "Q" + series[0].axes
-
-
-class Pages:
-    """A function for Image.fetch: the pages of a file, each read when it is needed."""
-
-    def __init__(self, path, file, series):
-        self.path, self.file, self.series = path, file, series
-        page = file.pages.first
-        self.page, self.contiguous = page, None
-        count = product(series.shape) // max(product(page.shape), 1)
-        if len(series.pages) == 1 and count > 1:  # the voxels of all slices lie behind the only page, as ImageJ keeps large files
-            self.contiguous = Flat(path, page.dtype.newbyteorder(file.byteorder), series.shape, page.dataoffsets[0])
-            if page.compression != 1:
-                raise esvr.BadInput(f"{path} has one page for {count} slices, and it is compressed")
-        elif None in series.pages or len(series.pages) < count:
-            raise esvr.BadInput(f"{path}: the pages of some of its {count} planes are missing; they may be in other files of the "
-                                "same image")
-        else:
-            for p in series.pages:
-                there = p.parent.filehandle.size
-                for at, size in zip(p.dataoffsets, p.databytecounts):
-                    if at + size > there:
-                        raise esvr.BadInput(f"{path} is cut short: a part of the image ends at byte {at + size} of {there}")
-                if page.compression == 1 and all(p.databytecounts):  # a part of no bytes is one of GDAL's voxels without data
-                    require_bytes(path, product(page.shape) * (page.bitspersample or 8) // 8, sum(p.databytecounts), "a page")
-        self.leading = series.shape[:len(series.shape) - len(self._squeezed(page.shape, series.shape))]
-
-    @staticmethod
-    def _squeezed(page_shape, series_shape):
-        """The axes of a page as they are in the series, where axes of one place may be left out."""
-        shape = list(page_shape)
-        while shape and tuple(shape) != tuple(series_shape[len(series_shape) - len(shape):]) and 1 in shape:
-            shape.remove(1)
-        return shape
-
-    def _array(self, number):
-        page = self.series.pages[number]
+    def read(number, index):
+        file.filehandle.open()
+        page = series.pages[number]
         handle = page.parent.filehandle
-        was_closed = handle.closed
-        if was_closed:
-            handle.open()
+        handle.open()
         try:
-            return self._decoded(page, number)
+            return page_array(path, file, page).reshape(inner)[index]
         finally:
-            if was_closed:
-                handle.close()
+            handle.close()
+            file.filehandle.close()
+    return planes(leading, read)
 
-    def _decoded(self, page, number):
-        try:
-            array = page.asarray()
-        except (ValueError, KeyError, NotImplementedError) as error:
-            if "imagecodecs" not in str(error) and "decompress" not in str(error) and "compression" not in str(error):
-                raise
-            array = self._by_gdal(page, number)
-        if self.page.tags.get(274) is not None:
-            array = oriented(array, int(self.page.tags[274].value), self.path)
-        return array.reshape(self.series.shape[len(self.leading):])
 
-    def _by_gdal(self, page, number):
-        """Pages in a code that tifffile cannot decode alone."""
-        need("osgeo.gdal", "python3-gdal", self.path, f"TIFF with the compression {page.compression!s}")
-        from osgeo import gdal
+def page_array(path, file, page):
+    """The pixels of a page as they are seen, which GDAL decodes where tifffile cannot do so alone."""
+    try:
+        array = page.asarray()
+    except (ValueError, KeyError, NotImplementedError) as error:
+        if not any(word in str(error) for word in ("imagecodecs", "decompress", "compression")):
+            raise
+        gdal = need("osgeo.gdal", "python3-gdal", path, f"TIFF with the compression {page.compression!s}")
         gdal.UseExceptions()
-        if page.predictor == 3 and self.file.byteorder == ">":
-            raise esvr.BadInput(f"{self.path} has floats in big-endian order with predictor 3, which GDAL decodes wrongly")
+        if page.predictor == 3 and file.byteorder == ">":
+            raise esvr.BadInput(f"{path} has floats in big-endian order with predictor 3, which GDAL decodes wrongly")
         data = gdal.Open(f"GTIFF_DIR:{page.index + 1}:{page.parent.filehandle.path}")
         array = data.ReadAsArray()
-        return np.moveaxis(array, 0, -1) if array.ndim == 3 and array.shape[0] != page.shape[0] else array
-
-    def __call__(self, index):
-        if self.contiguous:
-            return self.contiguous(index)
-        return self._fetch(index, 0, self.leading)
-
-    def _fetch(self, index, at, leading):
-        if not leading:
-            return self._array(at)[tuple(index)]
-        below = product(leading[1:])
-        if isinstance(index[0], (int, np.integer)):
-            return self._fetch(index[1:], at + int(index[0]) * below, leading[1:])
-        return np.stack([self._fetch(index[1:], at + i * below, leading[1:]) for i in range(*index[0].indices(leading[0]))])
-
-
-def oriented(array, orientation, path):
-    """The rows from above and the columns from the left, as TIFF's Orientation says they are seen."""
-    if orientation in (3, 4):
-        array = array[::-1]
-    if orientation in (2, 3):
-        array = array[:, ::-1]
+        if array.ndim == 3 and array.shape[0] != page.shape[0]:
+            array = np.moveaxis(array, 0, -1)
+    said = page.keyframe.tags.get("Orientation")
+    orientation = int(said.value) if said else 1
     if orientation > 4:
         raise esvr.BadInput(f"{path} has the orientation {orientation}, whose rows are columns; this is not read")
-    return array
+    array = array[::-1] if orientation in (3, 4) else array
+    return array[:, ::-1] if orientation in (2, 3) else array
 
 
+# -- descriptions --------------------------------------------------------------------------------------------------
 def imagej_axes(file, letters):
     """ImageJ may call slices times or nothing."""
-    described = file.imagej_metadata or {}
-    if "I" in letters or "Q" in letters:
-        letters = letters.replace("I", "Z").replace("Q", "Z")
-    if "Z" not in letters and letters.count("T") == 1 and "frames" not in described:
-        letters = letters.replace("T", "Z")
-    return letters
+    letters = letters.replace("I", "Z").replace("Q", "Z")
+    is_time = "Z" in letters or letters.count("T") != 1 or "frames" in (file.imagej_metadata or {})
+    return letters if is_time else letters.replace("T", "Z")
 
 
-class Space:
-    """What descriptions say of lengths and values. A distance of slices that is not known is None."""
-
-    def __init__(self):
-        self.spacing, self.origin, self.unit, self.scale = [1.0, 1.0, 1.0], [0.0, 0.0, 0.0], None, None
-        self.labels, self.warnings = [], []
-
-
-def describe(path, file, page, space, options):
+def describe(path, file, page, space, number, options):
     if file.is_ome:
-        describe_ome(file.ome_metadata, space)
+        describe_ome(ome_pixels(file), number, space)
     elif is_scifio(file):
         describe_scifio(page.description, space)
     elif file.is_imagej:
@@ -393,9 +320,13 @@ def local_name(element):
     return element.tag.rpartition("}")[2]
 
 
-def describe_ome(text, space):
-    root = tree.fromstring(text)
-    pixels = next(e for e in root.iter() if local_name(e) == "Pixels")
+def ome_pixels(file):
+    """The elements Pixels of all images."""
+    return [e for e in tree.fromstring(file.ome_metadata).iter() if local_name(e) == "Pixels"]
+
+
+def describe_ome(images, number, space):
+    pixels = images[min(number, len(images) - 1)]
     space.labels = [e.get("Name") or "" for e in pixels if local_name(e) == "Channel"]
     sizes = [abs(float(pixels.get(f"PhysicalSize{axis}") or 0.0)) for axis in "XYZ"]
     units = [unit_named(pixels.get(f"PhysicalSize{axis}Unit", "um")) for axis in "XYZ"]

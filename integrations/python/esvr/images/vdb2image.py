@@ -8,7 +8,6 @@ import esvr
 
 from . import program
 from .image import factor, product, unit_named
-from .image2vdb import count, word_of
 from .program import Option, Program, byte_size
 from .writers import FORMATS, INTEGERS, TYPES
 
@@ -21,7 +20,7 @@ PROGRAM = Program(
     [Option("grid", "NAME", "which of several grids", short="g"),
      Option("frame", "N", "which frame of a sequence in one .esvr file", int),
      Option("type", "TYPE", "type of the values: uint8, int16, float32, ... (as the image had it, where it holds all values)",
-            word_of("bool", *INTEGERS, "float16", "float32", "float64")),
+            ("bool", *INTEGERS, "float16", "float32", "float64")),
      Option("unit", "UNIT", "unit of lengths (that of the image that the grid came from)"),
      Option("max-memory", "SIZE", "limit on the memory of the grid and of the image (4G)", byte_size, default=4 * 10 ** 9),
      Option("force", "", "replace OUT if it exists", short="f")],
@@ -160,8 +159,8 @@ class Volume:
         return facts
 
     def _type(self, format_name, options):
-        possible, grid_type = TYPES[format_name], np.dtype({"bool": "bool", "vec3s": "float32", "float": "float32", "double": "float64"}
-                                                           .get(self.grid.value_type, self.grid.value_type))
+        possible, grid_type = TYPES[format_name], np.dtype({"vec3s": "float32", "float": "float32", "double": "float64"}.get(
+            self.grid.value_type, self.grid.value_type))
         came = self.metadata.get("image_type", grid_type.name)
         if options.type:
             wanted = [options.type]
@@ -189,19 +188,27 @@ class Volume:
                               f"exactly {'as ' + options.type if options.type else 'in any type of ' + format_name}; "
                               + ("choose another type" if options.type else "choose another format, or --type of image2vdb"))
 
-    def slabs(self, component=0, turn=None):
-        """The slices in the type of the file, contiguous; of vectors all components, or one of them."""
-        single = self.components == 3 and self.out.lower().endswith((".nii", ".nii.gz"))
+    def slabs(self, component=None, turn=None):
+        """The slices in the type of the file, contiguous; of vectors all components, or one of them. A matrix of 3 x 3 turns
+        vectors."""
         for last, values, gone in self._parts():
             if self.components == 3 and turn is not None:
                 values = values @ np.asarray(turn.T, values.dtype)
-            if single:
+            if component is not None:
                 values = values[..., component]
             values = values.astype(self.dtype, order="C")
             if gone is not None and self.missing is not None:
                 values[gone] = self.missing
             self.log.progress("writing", last / self.size[2])
             yield np.ascontiguousarray(values)
+
+    def save(self, path, header, tail=b"", turn=None):
+        """Writes a file of a header, the slices and an end."""
+        with open(path, "wb") as file:
+            file.write(header)
+            for slab in self.slabs(turn=turn):
+                file.write(slab.data)
+            file.write(tail)
 
 
 def work(arguments):

@@ -5,6 +5,7 @@ vectors), so that no writer needs the whole array. TYPES has the types of each f
 written in it.
 """
 import gzip
+import io
 import math
 import struct
 
@@ -57,7 +58,7 @@ def write_nifti(path, volume):
     with open(path, "wb") as plain, gzip.GzipFile("", "wb", 3, plain, mtime=0) if packed else plain as file:
         file.write(header.binaryblock)
         file.write(bytes(offset - len(header.binaryblock)))
-        for component in range(volume.components):
+        for component in range(3) if volume.components == 3 else [None]:
             for slab in volume.slabs(component):
                 file.write(slab.data)
 
@@ -83,10 +84,7 @@ def write_nrrd(path, volume):
     if "value_unit" in volume.metadata:
         lines.append(f"sample units: {volume.metadata['value_unit']}")
     turn = LPS_TO_RAS[:3, :3] if space == "left-posterior-superior" else None
-    with open(path, "wb") as file:
-        file.write(("\n".join(lines) + "\n\n").encode())
-        for slab in volume.slabs(turn=turn):
-            file.write(slab.data)
+    volume.save(path, ("\n".join(lines) + "\n\n").encode(), turn=turn)
 
 
 META_NAMES = {"int8": "CHAR", "uint8": "UCHAR", "int16": "SHORT", "uint16": "USHORT", "int32": "INT", "uint32": "UINT",
@@ -101,10 +99,7 @@ def write_metaimage(path, volume):
              "CenterOfRotation = 0 0 0", f"ElementSpacing = {numbers_text(lengths)}", f"DimSize = {' '.join(map(str, volume.size))}",
              *(["ElementNumberOfChannels = 3"] if volume.components == 3 else []),
              f"ElementType = MET_{META_NAMES[volume.dtype.name]}", "ElementDataFile = LOCAL"]
-    with open(path, "wb") as file:
-        file.write(("\n".join(lines) + "\n").encode())
-        for slab in volume.slabs(turn=LPS_TO_RAS[:3, :3]):
-            file.write(slab.data)
+    volume.save(path, ("\n".join(lines) + "\n").encode(), turn=LPS_TO_RAS[:3, :3])
 
 
 def write_vti(path, volume):
@@ -125,11 +120,7 @@ Name="{escaped}" NumberOfComponents="{volume.components}" format="appended" offs
 </PointData></Piece></ImageData>
 <AppendedData encoding="raw">
 _"""
-    with open(path, "wb") as file:
-        file.write(header.encode() + struct.pack("<Q", count))
-        for slab in volume.slabs():
-            file.write(slab.data)
-        file.write(b"\n</AppendedData>\n</VTKFile>\n")
+    volume.save(path, header.encode() + struct.pack("<Q", count), b"\n</AppendedData>\n</VTKFile>\n")
 
 
 # -- formats with axes along those of the world ------------------------------------------------------------------------
@@ -225,12 +216,11 @@ def write_tiff(path, volume):
 
 
 def write_npy(path, volume):
-    with open(path, "wb") as file:
-        np.lib.format.write_array_header_1_0(file, {
-            "descr": np.lib.format.dtype_to_descr(volume.dtype), "fortran_order": False,
-            "shape": volume.size[::-1] + ((3,) if volume.components == 3 else ())})
-        for slab in volume.slabs():
-            file.write(slab.data)
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {
+        "descr": np.lib.format.dtype_to_descr(volume.dtype), "fortran_order": False,
+        "shape": volume.size[::-1] + ((3,) if volume.components == 3 else ())})
+    volume.save(path, header.getvalue())
     if volume.unit or not np.allclose(volume.matrix_in(volume.unit), np.eye(4)):
         volume.warn("NPY has no place for lengths, the origin and the orientation of the grid, which are left out")
 
