@@ -995,6 +995,12 @@ def check_box_voxels(sections):
     assert record["box voxels"] == [(-100, -20, 2000), (7, -9, 5), (300, -24, 0)]
 
 
+def check_tone(sections):
+    record = sections["grid", 0, NONE]
+    assert (record["topology"], record["within range"], record["background"]) == (24, 1, 0.0)
+    assert abs(record["tone"] - 0.0425) < 1e-8
+
+
 def check_residual(sections):
     head, held = sections["residual", 0, NONE]
     assert (head["form"], head["divisor"], head["origin"]) == (0, 64.0, (8, -24, 1024))
@@ -1119,7 +1125,8 @@ def check_sequence(sections):
 
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
-          "voxels": check_voxels, "mask": check_mask, "box_voxels": check_box_voxels, "residual": check_residual,
+          "voxels": check_voxels, "mask": check_mask, "box_voxels": check_box_voxels, "tone": check_tone,
+          "residual": check_residual,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
           "vector_grid": check_vector_grid, "related_voxels": check_related_voxels,

@@ -151,6 +151,37 @@ TEST(RoundTrip, AFarBackgroundRaisesTheVersionAndComesBack) {
   }
 }
 
+TEST(RoundTrip, AToneCurveRaisesTheVersionAndComesBack) {
+  StoredGrid grid = test::fogGrid(7);
+  grid.tone.scale = 0.25f;
+  grid.withinRange = true;
+  EsvrFile file = test::fileOf(grid);
+  for (const auto layout : {FileLayout::kPlain, FileLayout::kCompact}) {
+    file.layout = layout;
+    const auto bytes = encodeEsvr(file);
+    EXPECT_EQ(int(bytes[10]), 5);
+    const EsvrFile back = decodeEsvr(bytes, "memory");
+    EXPECT_EQ(difference(back, file), "");
+    EXPECT_EQ(back.grids.front().tone, grid.tone);
+  }
+}
+
+TEST(RoundTrip, AToneCurveThatHasNoMeaningIsRefused) {
+  const auto refuses = [](const auto& spoil) {
+    StoredGrid grid = test::fogGrid(7);
+    grid.tone.scale = 0.25f;
+    grid.withinRange = true;
+    spoil(grid);
+    EXPECT_THROW((void)encodeEsvr(test::fileOf(grid)), RuntimeFailure);
+  };
+  refuses([](StoredGrid& grid) { grid.tone.scale = -1.0f; });
+  refuses([](StoredGrid& grid) { grid.tone.scale = NAN; });
+  refuses([](StoredGrid& grid) { grid.tone.scale = INFINITY; });
+  refuses([](StoredGrid& grid) { grid.field.background = 1.0f; });
+  refuses([](StoredGrid& grid) { grid.withinRange = false; });
+  refuses([](StoredGrid& grid) { grid.farBackground = true; });
+}
+
 TEST(RoundTrip, AFarBackgroundOfBricksIsRefused) {
   StoredGrid grid = test::levelSetGrid(7);
   grid.farBackground = true;

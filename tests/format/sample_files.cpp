@@ -88,6 +88,7 @@ std::string difference(const StoredGrid& a, const StoredGrid& b) {
   if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask) return "topology";
   if (!sameBits(a.activeThreshold, b.activeThreshold)) return "threshold";
   if (a.withinRange != b.withinRange) return "withinRange";
+  if (!(a.tone == b.tone)) return "tone";
   if (a.boxVoxels != b.boxVoxels) return "box voxels";
   if (!(a.activeBox == b.activeBox) || a.activeVoxels != b.activeVoxels) return "active voxels";
   if (!sameBits(a.valueMin, b.valueMin) || !sameBits(a.valueMax, b.valueMax)) return "value range";
@@ -356,6 +357,16 @@ StoredGrid withBoxVoxels() {
   return grid;
 }
 
+/// An ellipsoid whose values are those of a tone curve.
+StoredGrid withTone() {
+  StoredGrid grid = withBoxVoxels();
+  grid.field.background = 0.0f;
+  grid.descriptor.background = 0.0;
+  grid.withinRange = true;
+  grid.tone.scale = 0.0425f;
+  return grid;
+}
+
 /// Two grids with the same ellipsoids and the same mask.
 EsvrFile twins() {
   EsvrFile file{{}, {masked(), masked()}};
@@ -440,6 +451,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"copied_voxels", fileOf(copiedValues())},
       {"mask", fileOf(masked())},
       {"box_voxels", fileOf(withBoxVoxels())},
+      {"tone", fileOf(withTone())},
       {"twins", twins()},
       {"residual", fileOf(corrected())},
       {"carried",

@@ -126,6 +126,8 @@ TEST(RenderCells, DrawsByTheRuleOfTheVoxels) {
   const Field field = randomField({.count = 200});
   EXPECT_GE(agreement(field, optionsFor(), {.threshold = 0.2f}), kAskedByThreshold);
   EXPECT_GE(agreement(field, optionsFor(), {.range = ValueRange{-0.3f, 0.4f}}), kAsked);
+  EXPECT_GE(agreement(field, optionsFor(), {.tone = {0.1f}, .range = ValueRange{-1.0f, 1.0f}}),
+            kAsked);
 }
 
 // Half of the voxels of each brick are in its mask, and the box cuts through bricks. All voxels of

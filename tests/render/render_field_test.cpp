@@ -52,13 +52,15 @@ RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {5
 }
 
 double agreement(const Field& field, const RenderOptions& o,
-                 const std::optional<ValueRange>& range = std::nullopt) {
+                 const std::optional<ValueRange>& range = std::nullopt, ToneCurve tone = {}) {
   const double farthest = length(difference(o.camera.eye, o.camera.center)) + 100.0;
   const auto clamped = [&, sum = sumOfEllipsoids(field)](const Vec3& place) {
-    return range ? std::clamp(sum(place), double(range->min), double(range->max)) : sum(place);
+    const double s = tone.scale;
+    const double value = tone.isOn() ? s * std::sinh(sum(place) / s) : sum(place);
+    return range ? std::clamp(value, double(range->min), double(range->max)) : value;
   };
   const Image expected = referencePicture({clamped, field.background, farthest}, o);
-  const Image drawn = renderField(field, o, {.range = range});
+  const Image drawn = renderField(field, o, {.tone = tone, .range = range});
   double light = 0.0;
   for (const float v : drawn.rgba) light += v;
   EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
@@ -86,6 +88,11 @@ TEST(RenderField, SlowClampsSumsToTheRangeOfTheVoxels) {
   Field field = randomField({.count = 300});
   field.background = 0.125f;
   EXPECT_GE(agreement(field, optionsFor(), ValueRange{-0.25f, 0.5f}), kAsked);
+}
+
+TEST(RenderField, SlowDrawsTheValuesOfTones) {
+  const Field field = randomField({.count = 300});
+  EXPECT_GE(agreement(field, optionsFor(), ValueRange{-1.0f, 1.0f}, {0.1f}), kAsked);
 }
 
 TEST(RenderField, AgreesForNeedlesAndPancakes) {

@@ -269,6 +269,9 @@ TEST_P(FieldOnGpu, AgreesByTheRuleOfTheVoxels) {
   field.background = 0.125f;
   expectTheCpusPicture(field, optionsFor(), {},
                        {.threshold = 0.1f, .range = ValueRange{-0.25f, 0.5f}});
+  field.background = 0.0f;
+  expectTheCpusPicture(field, optionsFor(), {},
+                       {.tone = {0.1f}, .threshold = 0.1f, .range = ValueRange{-0.5f, 1.0f}});
   field.background = 0.75f;
   expectTheCpusPicture(field, optionsFor(), {}, {.threshold = 0.1f, .narrowBand = true});
 }
