@@ -304,7 +304,8 @@ ThriftyLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
                             codec::PastVoxels(*options.previous, layer), thrift, layer);
     return {std::move(layer)};
   }
-  const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice, options.signs};
+  const codec::Thrift thrift{placesOf(volume, layer), options.bitPrice, options.signs,
+                             options.massPrice};
   const codec::CodedPart part =
       codec::chooseCodes(codec::chooseModel(layer), thrift, options.mostBytes, layer);
   const auto tooMany = extrapolated(part, layer.bricks.size(), options.mostBytes);

@@ -680,6 +680,7 @@ class VoxelCoder {
   void codeValues(Side& side, std::size_t b, const Halo::Before& before) {
     halo_.fillCodes(layer_, before, model_.vacantCode);
     codes_ = layer_.codes.data() + b * kBrickVoxels;
+    owed_ = 0.0;
     if (layer_.vacant[b].count() == kBrickVoxels) return fill(b, 0);
     const std::int32_t expected = halo_.code[std::size_t(Halo::cell({-1, 0, 0}))];
     const auto only = kReads ? std::nullopt : onlyCode(b);
@@ -763,6 +764,7 @@ class VoxelCoder {
       const int v = place.first + z;
       if ((place.vacant >> z & 1u) != 0) {
         last = set(v, model_.vacantCode);
+        owe(v, last);
         class_[place.cell + std::size_t(z)] = vacantClass_;
         continue;
       }
@@ -772,6 +774,7 @@ class VoxelCoder {
         const std::uint32_t known = codeClass(fast, place.cell + std::size_t(z), image, v);
         if (known > 0) {
           last = set(v, model_.common[known - 1]);
+          owe(v, last);
           continue;
         }
       }
@@ -783,6 +786,7 @@ class VoxelCoder {
                                             : line.template guess<kRule>(z, last);
       const std::int32_t wanted = kReads ? 0 : thriftyCode(model, guess, v);
       last = set(v, plus(guess, differences_.code(fast, model, minus(wanted, guess))));
+      owe(v, last);
       counts[std::size_t(z)] = -1;
       if (kMirrors && image) learnImage(apart(last, image->code));
     }
@@ -856,16 +860,28 @@ class VoxelCoder {
 
   // ---- The choice of codes
 
-  /// The code with the least sum of squared error and price of bits: the nearest one, the next ones towards the
-  /// prediction, or the prediction itself if it is near.
+  /// A voxel in units of the lattice.
+  [[nodiscard]] double exactOf(int v) const {
+    return thrift_->exact[std::size_t(codes_ - layer_.codes.data()) + std::size_t(v)];
+  }
+
+  /// Adds the error of a code to those of the brick.
+  void owe(int v, std::int32_t code) {
+    if constexpr (!kReads)
+      if (thrift_ && thrift_->massPrice > 0.0) owed_ += double(code) - exactOf(v);
+  }
+
+  /// The code with the least sum of squared error, price of bits, and price of the brick's error: the nearest one, the
+  /// next ones towards the prediction, the prediction itself if it is near, or the one beside the nearest that makes up
+  /// for errors of the brick.
   std::int32_t thriftyCode(DifferenceModel& model, std::int32_t guess, int v) const {
     const std::int32_t nearest = codes_[v];
-    if (!thrift_ || guess == nearest) return nearest;
-    const double exact = thrift_->exact[std::size_t(codes_ - layer_.codes.data()) + std::size_t(v)];
+    if (!thrift_ || (guess == nearest && thrift_->massPrice == 0.0)) return nearest;
+    const double exact = exactOf(v);
     const auto costOf = [&](std::int32_t code) {
-      const double error = exact - double(code);
+      const double error = double(code) - exact, all = owed_ + error;
       const std::uint32_t price = VoxelDifferences::priceOf(model, minus(code, guess));
-      return error * error +
+      return error * error + thrift_->massPrice * all * all +
              thrift_->bitPrice * double(price) / double(1 << BitPrices::kFractionBits);
     };
     const std::int32_t step = guess > nearest ? 1 : -1;
@@ -876,6 +892,11 @@ class VoxelCoder {
       if (thrift_->signs == RoundedSigns::kKept && (code < 0) != (nearest < 0)) break;
       const double cost = costOf(code);
       if (cost < least) least = cost, best = code;
+    }
+    if (thrift_->massPrice > 0.0) {
+      const std::int32_t code = nearest + (owed_ < 0.0 ? 1 : -1);
+      const bool mayBe = thrift_->signs != RoundedSigns::kKept || (code < 0) == (nearest < 0);
+      if (mayBe && costOf(code) < least) best = code;
     }
     return best;
   }
@@ -904,6 +925,7 @@ class VoxelCoder {
   std::vector<std::uint8_t>& isCopy_;
   std::uint8_t vacantClass_;
   const Thrift* thrift_;
+  double owed_ = 0.0;  ///< sum of the errors of the brick so far, in steps
   std::size_t partBricks_ = 0;     ///< bricks of this part of the stream that are no copies
   std::uint32_t lastSource_ = 0;   ///< source of the latest brick that was a copy
   std::uint32_t lastVacancy_ = 0;  ///< vacancy of the latest brick that has one

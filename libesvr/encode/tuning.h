@@ -76,6 +76,8 @@ struct Tuning {
   /// frame before, those whose bits are not worth their price keep to the prediction; in a frame this
   /// also means less flicker.
   double price = 0.08, predictedPrice = 0.14, framePrice = 0.2;
+  /// The price of the error of a brick where a volume is judged by what is seen (ThriftOptions::massPrice).
+  double massPrice = 0.012;
   /// Share of the errors of the frame before that voxels keep. On a fire and a gas, 0 takes fewer
   /// bytes and flickers; a half and more takes many bytes for little less flicker.
   double errorsKept = 0.25;

@@ -222,7 +222,8 @@ VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setti
   if (setting.price == 0.0) return layer;
   const StoredGrid* previous = job_.options.previous;
   ThriftOptions thrift{setting.price, previous && previous->voxels ? &*previous->voxels : nullptr,
-                       job_.options.keepsPastErrors ? kTuning.errorsKept : 0.0, voxelSigns(job_)};
+                       job_.options.keepsPastErrors ? kTuning.errorsKept : 0.0, voxelSigns(job_),
+                       seesPictures(job_) ? kTuning.massPrice : 0.0};
   if (tooMany) {
     const double left = double(*goal_.bytes - std::min(*goal_.bytes, besides_));
     thrift.mostBytes =

@@ -195,6 +195,10 @@ struct ThriftOptions {
   double steadiness = 0.0;
   /// With kKept, no code gets another sign (negative or not) than the voxel has in the volume.
   RoundedSigns signs = RoundedSigns::kMayChange;
+  /// Price of the square of the sum of the errors of a brick's voxels, relative to that of the square of
+  /// one error. Without it, faint voxels become 0 one by one, and a brick loses what they add up to. It is
+  /// ignored with `previous`.
+  double massPrice = 0.0;
   /// Bytes of the codes above which the work stops. It is ignored with `previous`.
   std::uint64_t mostBytes = std::numeric_limits<std::uint64_t>::max();
 };
