@@ -10,7 +10,7 @@ import { after, before } from "node:test";
 export const kFlags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"];
 /** Flags for pages whose server draws. A GPU in software would take a third of the time of their tests. */
 const kServedFlags = ["--disable-gpu", "--renderer-process-limit=1", "--no-sandbox"];
-const kStartMs = 20_000;
+const kStartMs = 60_000; // the machine may be busy
 
 /** A program of the project; the build names it in the environment. */
 function program(name) {
@@ -79,7 +79,8 @@ async function newTab(t, shared, options) {
  * takes longer than most tests; the page is loaded anew for each of them.
  */
 export async function openPage(t, shared, { hash = "", url = shared.server?.url, expectErrors, ...options } = {}) {
-  const all = { viewport: { width: 900, height: 600 }, permissions: ["clipboard-read", "clipboard-write"], ...options };
+  const viewport = shared.viewport ?? { width: 900, height: 600 };
+  const all = { viewport, permissions: ["clipboard-read", "clipboard-write"], ...options };
   const shares = Object.keys(options).length === 0 && !shared.taken;
   const page = shares ? (shared.tab ??= await newTab(null, shared, all)) : await newTab(t, shared, all);
   if (shares) {
