@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <functional>
@@ -374,7 +375,13 @@ TEST_F(SequenceFile, IsResumedAfterAnyByte) {
     for (const auto& group : kGroups) append(writer, group), writer.endGroup();
   }
   const auto left = bytesIn(partial());
-  for (std::size_t n = 0; n <= left.size(); n += 5) {
+  // Each byte where the number of complete groups changes, and some of the others.
+  constexpr std::size_t kStride = 23;
+  const auto next = [&](std::size_t n) {
+    const std::size_t far = std::min(n + kStride, left.size());
+    return n < far && complete[far] == complete[n] ? far : n + 1;
+  };
+  for (std::size_t n = 0; n <= left.size(); n = next(n)) {
     test::writeBytes(partial(), {left.begin(), left.begin() + std::ptrdiff_t(n)});
     SequenceWriter writer(path(), {.overwrite = true, .partial = PartialSequence::kResume});
     ASSERT_EQ(writer.groupCount(), complete[n]) << n;
