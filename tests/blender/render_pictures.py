@@ -3,7 +3,7 @@
     blender --background --factory-startup --python render_pictures.py -- \\
         OUT.json GRID A.vdb A.exr B.vdb B.exr ...
 
-The pictures have 256 x 256 pixels with 64 samples each and no denoiser, and are written as OpenEXR
+The pictures have 96 x 96 pixels with 100 samples each and no denoiser, and are written as OpenEXR
 with 32-bit floats. If GRID is `density`, the sun shines on the smoke of this grid. Otherwise, the
 smoke glows in the colors (v + 1) / 2 of the vectors v of GRID. The camera and the opacity follow
 from the bounds of the first file, and are the same for all files. OUT.json has the PSNR in dB, with
@@ -17,8 +17,8 @@ import bpy
 from mathutils import Vector
 
 DENSITY = "density"
-SIDE = 256
-SAMPLES = 64
+SIDE = 96
+SAMPLES = 100
 OPTICAL_DEPTH = 40.0  # through the diagonal of the bounds where the density is 1
 TOWARDS_CAMERA = Vector((1.0, -2.0, 0.7)).normalized()  # shows three sides
 SUN_STRENGTH = 20.0

@@ -29,7 +29,6 @@ class RanksTest : public test::FolderTest {
     for (const char* name : {"OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM",
                              "OMPI_MCA_rmaps_base_oversubscribe"})
       ::setenv(name, "1", 1);
-    ::setenv("OMPI_MCA_odls_base_sigkill_timeout", "10", 1);  // the machine may be busy
     test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}});
   }
   [[nodiscard]] std::vector<std::string> conversion(const std::string& name,
@@ -125,13 +124,16 @@ TEST_F(RanksTest, SaysWhichRankFailsAlone) {
 }
 
 TEST_F(RanksTest, SlowWriteTheBestResultWhenInterrupted) {
+  // Open MPI always waits so long before it kills ranks, and these write their result first.
+  ::setenv("OMPI_MCA_odls_base_sigkill_timeout", "4", 1);
   auto command = conversion("out.esvr", {"--chunk-voxels", "600"});
   *std::next(std::ranges::find(command, "--iterations")) = "10000000";
   command.insert(command.begin(), {"-n", "2"});
   test::RunningProgram program(ESVR_MPIEXEC, command);
-  std::this_thread::sleep_for(std::chrono::seconds(4));
+  const auto says = [&] { return program.err().find("best result so far") != std::string::npos; };
+  while (program.runs() && !says()) std::this_thread::sleep_for(std::chrono::milliseconds(20));
   ASSERT_TRUE(program.runs()) << program.err();
-  EXPECT_THAT(program.err(), HasSubstr("best result so far"));
+  std::this_thread::sleep_for(std::chrono::seconds(1));  // there is something to write
   program.send(SIGINT);
   const auto run = program.wait();
   EXPECT_NE(run.exitCode, 0);

@@ -238,7 +238,7 @@ test("a damaged link shows the usual view", async (t) => {
 });
 
 test("never more than one picture is asked for at a time, and the last one is complete", async (t) => {
-  const page = await openPage(t, shared);
+  const page = await openPage(t, shared, { locale: "en-US" }); // in a tab of its own
   const open = new Set();
   let most = 0, moving = 0;
   page.on("websocket", () => assert.fail("the page uses one connection"));

@@ -6,8 +6,11 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before } from "node:test";
 
+/** Flags for pages that draw by WebGL themselves. */
 export const kFlags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"];
-const kStartMs = 20_000;
+/** Flags for pages whose server draws. A GPU in software would take a third of the time of their tests. */
+const kServedFlags = ["--disable-gpu", "--renderer-process-limit=1", "--no-sandbox"];
+const kStartMs = 60_000; // the machine may be busy
 
 /** A program of the project; the build names it in the environment. */
 function program(name) {
@@ -54,7 +57,7 @@ export function bench() {
     shared.files = makeSamples(shared.folder);
     const { fitted, smoke, sequence } = shared.files;
     shared.server = await serve([fitted, smoke, sequence]);
-    shared.browser = await chromium.launch({ executablePath: process.env.ESVR_BROWSER ?? "/usr/bin/chromium", args: kFlags });
+    shared.browser = await chromium.launch({ executablePath: process.env.ESVR_BROWSER ?? "/usr/bin/chromium", args: kServedFlags });
   });
   after(async () => {
     await shared.browser?.close();
@@ -64,20 +67,38 @@ export function bench() {
   return shared;
 }
 
-/** Opens the page, and ends it with the test. Errors of its script fail the test. */
-export async function openPage(t, shared, { hash = "", url, ...options } = {}) {
-  const context = await shared.browser.newContext({
-    viewport: { width: 900, height: 600 }, permissions: ["clipboard-read", "clipboard-write"], ...options,
-  });
-  t.after(() => context.close());
-  const page = await context.newPage();
+/** An empty tab of a new context, which ends with the test. */
+async function newTab(t, shared, options) {
+  const context = await shared.browser.newContext(options);
+  t?.after(() => context.close());
+  return context.newPage();
+}
+
+/**
+ * Opens the page. Errors of its script fail the test. Tests without other options share a tab, because a new one
+ * takes longer than most tests; the page is loaded anew for each of them.
+ */
+export async function openPage(t, shared, { hash = "", url = shared.server?.url, expectErrors, ...options } = {}) {
+  const viewport = shared.viewport ?? { width: 900, height: 600 };
+  const all = { viewport, permissions: ["clipboard-read", "clipboard-write"], ...options };
+  const shares = Object.keys(options).length === 0 && !shared.taken;
+  const page = shares ? (shared.tab ??= await newTab(null, shared, all)) : await newTab(t, shared, all);
+  if (shares) {
+    shared.taken = true;
+    t.after(() => (shared.taken = false));
+  }
   const errors = [];
-  page.on("pageerror", (error) => errors.push(error));
-  page.on("console", (message) => message.type() === "error" && errors.push(new Error(message.text())));
+  const onError = (error) => errors.push(error);
+  const onConsole = (message) => message.type() === "error" && errors.push(new Error(message.text()));
+  page.on("pageerror", onError).on("console", onConsole);
   t.after(() => {
-    if (errors.length > 0 && !options.expectErrors) throw errors[0];
+    page.off("pageerror", onError).off("console", onConsole);
+    if (errors.length > 0 && !expectErrors) throw errors[0];
   });
-  await page.goto((url ?? shared.server.url) + hash);
+  if (page.url().split("#")[0] === url) {
+    await page.evaluate((address) => history.replaceState(null, "", address), url + hash);
+    await page.reload();
+  } else await page.goto(url + hash);
   await page.locator(".viewer").waitFor({ timeout: kStartMs });
   await rested(page);
   return page;

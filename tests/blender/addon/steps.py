@@ -1,9 +1,10 @@
-"""What tests of the add-on do within Blender: a step by its name, whose result is written as JSON.
+"""What tests of the add-on do within Blender: steps by their names, whose results are printed as JSON.
 
-    blender --background --factory-startup --python steps.py -- STEP ARGUMENTS.json RESULT.json
+    blender --background --factory-startup --python steps.py
 
-The arguments are those of the function of that name, and `preferences`, which are set first. Errors of operators are
-results, too.
+Each line of the input is a request: `step`, the `arguments` of the function of that name, and `home`, the folder of
+the user's cache. `preferences` among the arguments are set first. A step begins with the factory settings.
+Errors of operators are results, too; an exception ends Blender.
 """
 import json
 import os
@@ -151,15 +152,15 @@ def unregister():
 
 
 def main():
-    step, arguments_file, result_file = sys.argv[sys.argv.index("--") + 1:]
-    with open(arguments_file, encoding="utf-8") as file:
-        arguments = json.load(file)
-    preferences = arguments.pop("preferences", None)
-    if preferences is not None:
-        enable(preferences)
-    result = globals()[step](**arguments)
-    with open(result_file, "w", encoding="utf-8") as file:
-        json.dump(result, file)
+    for line in sys.stdin:
+        request = json.loads(line)
+        os.environ["XDG_CACHE_HOME"] = request["home"]
+        bpy.ops.wm.read_factory_settings()
+        preferences = request["arguments"].pop("preferences", None)
+        if preferences is not None:
+            enable(preferences)
+        result = globals()[request["step"]](**request["arguments"])
+        print("result of the step: " + json.dumps(result), flush=True)
 
 
 main()

@@ -1,6 +1,7 @@
 """The add-on in Blender: what it imports is what the .vdb files of esvr2vdb would be, and it follows changes.
 
-The add-on is installed as a zip file into a fresh folder of scripts. Each test runs Blender once, without a window.
+The add-on is installed as a zip file into a fresh folder of scripts. The steps of all tests but one run in one Blender
+without a window, because its start takes longer than most of them; each step begins with the factory settings.
 """
 import json
 import os
@@ -14,59 +15,81 @@ from conftest import BUILD, FRAMES, Programs
 
 HERE = pathlib.Path(__file__).resolve().parent
 PACK = HERE.parents[2] / "integrations/blender/pack.py"
+RESULT = "result of the step: "  # begins the line with it (steps.py)
+
+
+class Session:
+    """A Blender into which the add-on was installed."""
+
+    def __init__(self, folder):
+        modules = os.pathsep.join([str(BUILD / "python"), os.environ.get("PYTHONPATH", "")])
+        self.environment = {**os.environ, "PYTHONPATH": modules, "BLENDER_USER_SCRIPTS": str(folder / "scripts"),
+                            "BLENDER_USER_CONFIG": str(folder / "config")}
+        for name in ("scripts", "config"):
+            (folder / name).mkdir()
+        words = ["blender", "--background", "--factory-startup", "--python-exit-code", "1", "--python",
+                 HERE / "steps.py"]
+        self.process = subprocess.Popen(words, text=True, env=self.environment, stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+    def run(self, step, arguments, home):
+        """The result of a step. `home` is the folder of the user's cache."""
+        request = {"step": step, "arguments": arguments, "home": home}
+        self.process.stdin.write(json.dumps(request, default=str) + "\n")
+        self.process.stdin.flush()
+        said = []
+        for line in self.process.stdout:
+            if line.startswith(RESULT):
+                return json.loads(line.removeprefix(RESULT))
+            said.append(line)
+        raise AssertionError("".join(said))
+
+    def end(self):
+        self.process.communicate(timeout=60)
 
 
 class Blender:
-    def __init__(self, folder):
-        self.folder = folder
+    """What a test does in Blender, with a cache and preferences of its own."""
+
+    def __init__(self, session, folder):
+        self.session, self.folder = session, folder
         self.cache = folder / "decoded files"
-        modules = os.pathsep.join([str(BUILD / "python"), os.environ.get("PYTHONPATH", "")])
-        self.environment = {**os.environ, "PYTHONPATH": modules, "BLENDER_USER_SCRIPTS": str(folder / "scripts"),
-                            "BLENDER_USER_CONFIG": str(folder / "config"), "XDG_CACHE_HOME": str(folder / "home")}
-        for name in ("scripts", "config"):
-            (folder / name).mkdir()
         self.preferences = {"cache_place": "FOLDER", "cache_folder": str(self.cache), "decoder": "PROGRAM",
                             "esvr2vdb": Programs.esvr2vdb, "vdb2esvr": Programs.vdb2esvr}
 
     def run(self, step, preferences=(), **arguments):
         """The result of a step. `preferences` differ from those of the other steps."""
-        words, result = self.folder / "arguments.json", self.folder / "result.json"
-        if preferences is not None:
-            arguments["preferences"] = {**self.preferences, **dict(preferences)}
-        words.write_text(json.dumps(arguments, default=str))
-        return self._run(["blender", "--background", "--factory-startup", "--python-exit-code", "1", "--python",
-                          HERE / "steps.py", "--", step, words, result], result)
+        arguments["preferences"] = {**self.preferences, **dict(preferences)}
+        return self.session.run(step, arguments, self.folder / "home")
 
     def run_window(self, **arguments):
         """The result of window_steps.py, whose window is kept in memory."""
         words, result = self.folder / "arguments.json", self.folder / "result.json"
         words.write_text(json.dumps({"preferences": self.preferences, **arguments}, default=str))
-        return self._run(["xvfb-run", "-a", "-s", "-screen 0 1024x768x24", "blender", "--factory-startup",
-                          "--enable-event-simulate", "--python-exit-code", "1", "--python", HERE / "window_steps.py", "--", words, result], result)
-
-    def _run(self, words, result):
-        result.unlink(missing_ok=True)
-        done = subprocess.run(words, text=True, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              timeout=300)
+        done = subprocess.run(["xvfb-run", "-a", "-s", "-screen 0 1024x768x24", "blender", "--factory-startup",
+                               "--enable-event-simulate", "--python-exit-code", "1", "--python",
+                               HERE / "window_steps.py", "--", words, result], text=True,
+                              env={**self.session.environment, "XDG_CACHE_HOME": str(self.folder / "home")},
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=300)
         assert result.exists(), done.stdout
         return json.loads(result.read_text())
 
 
 @pytest.fixture(scope="session")
-def installed(tmp_path_factory):
-    """A folder of Blender's scripts with the add-on, as Blender's installer leaves it."""
+def session(tmp_path_factory):
+    """A Blender with the add-on, as its installer leaves it."""
     folder = tmp_path_factory.mktemp("installed")
     subprocess.run([sys.executable, PACK, folder / "esvr_blender.zip"], check=True)
-    blender = Blender(folder)
-    assert blender.run("install", None, zip_file=folder / "esvr_blender.zip") == {"menu": False, "property": False}
-    return folder / "scripts"
+    started = Session(folder)
+    installed = started.run("install", {"zip_file": folder / "esvr_blender.zip"}, folder / "home")
+    assert installed == {"menu": False, "property": False}
+    yield started
+    started.end()
 
 
 @pytest.fixture
-def blender(installed, tmp_path):
-    made = Blender(tmp_path)
-    shutil.copytree(installed, tmp_path / "scripts", dirs_exist_ok=True)
-    return made
+def blender(session, tmp_path):
+    return Blender(session, tmp_path)
 
 
 @pytest.fixture
