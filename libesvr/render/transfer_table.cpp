@@ -11,6 +11,10 @@ constexpr int kIntervals = SegmentSpan::kIntervals;
 constexpr int kExtinction = SegmentEntry::kExtinction;
 constexpr int kSamplesOfInterval = 4;  // values at which an interval is sampled
 
+/// Bends that are neglected (SegmentTableView::bends), as a share of the table. With a linear
+/// opacity, an opacity then errs by less than this. Smoke has few bends that are larger.
+constexpr float kLeastBend = 1.0f / 32.0f;
+
 Classified classified(const TransferFunction& f, double value, double length) {
   const Rgb color = colorAt(f.colors, value);
   const double alpha = 1.0 - std::pow(1.0 - opacityAt(f.opacity, value), length);
@@ -79,6 +83,7 @@ TransferTable::TransferTable(const TransferFunction& f, const Sampling& sampling
 void TransferTable::integrate(const TransferFunction& f, double length) {
   const ValueExtent extent = extentOf(f);
   segmentScale_ = extent.flat() ? 1.0f : scale_;
+  leastBend_ = extent.flat() ? 0.0f : kLeastBend * kIntervals;
   const auto means = meansOf(f, extent, length);
   double total = 0.0;
   for (int i = 1; i <= kIntervals; ++i) total += means[std::size_t(i)][kExtinction];
@@ -98,7 +103,8 @@ void TransferTable::integrate(const TransferFunction& f, double length) {
 }
 
 TransferTableView TransferTable::on(const Classified* values, const SegmentEntry* segments) const {
-  return {values, low_, scale_, nan_, {segments, low_, segmentScale_, unit_, nanSegment_}};
+  return {
+      values, low_, scale_, nan_, {segments, low_, segmentScale_, unit_, leastBend_, nanSegment_}};
 }
 
 }  // namespace esvr
