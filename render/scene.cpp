@@ -300,8 +300,8 @@ void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
 namespace {
 
 /// Whether a grid of ellipsoids has so much empty space between its voxels that the table of its
-/// blocks of 64^3 voxels, by which rays find bricks, would be too large. Such a grid is decoded at
-/// once, and its bricks are found by a search.
+/// blocks of 64^3 voxels, by which rays find bricks, would be too large. A CUDA device draws such a
+/// grid as a NanoVDB grid; on the CPU, makeFieldRenderer() does without the table.
 bool liesFarApart(const Scene& scene) {
   constexpr double kMostBlocks = double(1 << 26);  // 256 MB
   constexpr double kBlockSide = 64.0;
@@ -331,8 +331,11 @@ SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSetting
 DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& memory) {
   if (const auto* const grid = std::get_if<VolumeGrid>(&scene.content)) return &grid->volume;
   const StoredGrid& stored = *scene.encoded;
-  if (followsFromEllipsoids(stored))
-    return DrawnField{&std::get<Field>(scene.content), voxelRule(stored)};
+  if (followsFromEllipsoids(stored)) {
+    DrawnField drawn{&std::get<Field>(scene.content), voxelRule(stored)};
+    drawn.voxels.memory = memory.voxels;
+    return drawn;
+  }
   decoded_.push_back(decodeGrid(stored, {.maxBytes = memory.maxBytes, .memory = memory.voxels}));
   return &decoded_.back();
 }
@@ -340,7 +343,7 @@ DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& me
 void SceneRenderer::drawAlone(const Scene& scene, const DrawSettings& s) {
   const bool isNano = !s.shaded && (s.device.kind == DeviceKind::kCuda || s.values);
   const auto* voxels = std::get_if<VolumeGrid>(&scene.content);
-  if (!voxels && liesFarApart(scene)) {
+  if (!voxels && s.device.kind == DeviceKind::kCuda && liesFarApart(scene)) {
     const StoredGrid& stored = *scene.encoded;
     farApart_ = VolumeGrid{
         stored.descriptor,
