@@ -443,6 +443,7 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
   Options options = given;
+  options.read.directory = record.input.directory;
   GridChoice choice = chooseFor(options, record.input);
   carryInactiveValues(
       options, [&](std::string text) { log.warning(std::move(text)); }, choice);
