@@ -145,15 +145,16 @@ export class Decoder {
 
   /**
    * @param {[Triple, Triple]} box
-   * @param {{direction: Triple | null, orthographic: boolean, width: number, height: number}} wish
+   * @param {{direction: Triple | null, orthographic: boolean, width: number, height: number, edges: import("../types.js").Edges | null}} wish
    * @returns {Camera}
    */
-  fit(box, { direction, orthographic, width, height }) {
+  fit(box, { direction, orthographic, width, height, edges }) {
     return this.#scoped((take) => {
       const corners = take(6 * kWordBytes), out = take(10 * kDoubleBytes);
       this.#words(corners, 6).set(box.flat());
       const from = direction ? this.#putNumbers(take, direction) : 0;
-      this.#exports.page_fit(corners, from, orthographic ? 1 : 0, width, height, out);
+      const voxel = edges ? this.#putNumbers(take, edges.flat()) : 0;
+      this.#exports.page_fit(corners, voxel, from, orthographic ? 1 : 0, width, height, out);
       const n = [...new Float64Array(this.#memory, out, 10)];
       const places = { eye: n.slice(0, 3), center: n.slice(3, 6), up: n.slice(6, 9) };
       return /** @type {any} */ ({ ...places, [orthographic ? "height" : "fov"]: n[9] });
