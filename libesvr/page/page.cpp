@@ -198,6 +198,7 @@ struct Tables : page_tables {
     intervals = TransferTableView::kIntervals;
     low = view.low, scale = view.scale;
     weak_gradient_squared = lightRule({}, View({}, {}), f).weakSquared;  // the same for every view
+    least_bend = view.segments.leastBend;
     static_assert(sizeof(Classified) == 4 * sizeof(float));
     values = &view.entries->r;
     if (sampling.side > 1) fillSegments(view.segments, sampling);

@@ -64,6 +64,7 @@ struct page_tables {
   int intervals;
   float low, scale;             ///< lowest value and intervals per unit; scale 0: no extent
   float weak_gradient_squared;  ///< the square of the gradient at which half of the shading is left
+  float least_bend;             ///< intervals; SegmentTableView::leastBend
   const float* values;          ///< intervals + 1 times red, green, blue, alpha
   /// side x side times the light of a segment as red, green, blue and alpha, premultiplied. Entry
   /// (i, j), i fastest, is a segment from the value i to the value j of `side` values at equal distances

@@ -40,21 +40,6 @@ class CpuRenderer final : public Renderer {
   FrameStats stats_;
 };
 
-/// Whether the ellipsoids of a field have so much empty space between them that the table of their
-/// blocks of voxels, by which rays find bricks, would be too large.
-bool liesFarApart(const Field& field, const Box& wanted) {
-  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
-  const auto box = supportBox(field);
-  if (!box) return false;
-  const Vec3 low = pointOf(wanted.min), high = pointOf(wanted.max);
-  double blocks = 1.0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const double side = std::min(box->high[a], high[a]) - std::max(box->low[a], low[a]);
-    blocks *= std::max(0.0, side) / kBlockSide + 2.0;
-  }
-  return blocks > kMostBlocks;
-}
-
 /// Draws a field on the CPU. Its voxels are kept from picture to picture. Voxels that lie far apart
 /// are decoded at once, and their bricks are found by a search.
 struct FieldDrawing {
@@ -143,6 +128,19 @@ class CudaFieldRenderers final : public Renderer {
 };
 
 }  // namespace
+
+bool liesFarApart(const Field& field, const Box& wanted) {
+  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
+  const auto box = supportBox(field);
+  if (!box) return false;
+  const Vec3 low = pointOf(wanted.min), high = pointOf(wanted.max);
+  double blocks = 1.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double side = std::min(box->high[a], high[a]) - std::max(box->low[a], low[a]);
+    blocks *= std::max(0.0, side) / kBlockSide + 2.0;
+  }
+  return blocks > kMostBlocks;
+}
 
 std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
                                             const RendererLimits& limits,

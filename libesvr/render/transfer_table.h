@@ -115,7 +115,7 @@ struct SegmentTableView {
   const SegmentEntry* entries;
   float low, scale;  ///< lowest value, and intervals per unit of value
   float unit;        ///< what one unit of the integrals stands for
-  float leastBend;   ///< intervals; see bends()
+  float leastBend;   ///< intervals, infinite for a transparent table; see bends()
   PixelColor nan;
 
   /// The light of the segment from a sample to the next, whose values are a and b. The color of a

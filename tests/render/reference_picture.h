@@ -36,6 +36,7 @@ class Integrals {
   double length_, low_, scale_;
   std::vector<Channels> means_;   ///< of the values below, of each interval, and of those above
   std::vector<Channels> before_;  ///< integrals up to each interval
+  double mostExtinction_ = 0.0;
 };
 
 /// Premultiplied color, and what is left of the light behind.

@@ -269,8 +269,8 @@ TEST(Classification, AFaceOfAConstantBodyHasNoStripes) {
   for (const OpacityCurve& curve : kBodies)
     for (const Vec3& from : {Vec3{1.0, 0.11, 0.17}, Vec3{0.12, 0.19, -1.0}}) {
       const RenderOptions o = tilted(4.0, {builtInColorMap("viridis"), curve}, from);
-      EXPECT_LE(variance(renderVolume(box(), o), 1), 1e-5);
-      EXPECT_LE(fromFine(box(), o), 0.02);
+      EXPECT_LE(variance(renderVolume(box(), o), 1), 2e-5);
+      EXPECT_LE(fromFine(box(), o), 0.06);
     }
 }
 
@@ -279,7 +279,7 @@ TEST(Classification, AFaceThatIsClippedHasNoStripes) {
     for (const Vec3& from : {Vec3{1.0, 0.11, 0.17}, Vec3{0.12, 0.19, -1.0}}) {
       RenderOptions o = tilted(4.0, {builtInColorMap("viridis"), curve}, from);
       o.clip = PlaceBox{{18.3, 18.3, 18.3}, {28.7, 28.7, 28.7}};
-      EXPECT_LE(fromFine(box(), o), 0.05);
+      EXPECT_LE(fromFine(box(), o), 0.12);
     }
 }
 

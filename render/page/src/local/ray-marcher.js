@@ -234,6 +234,7 @@ export class RayMarcher {
     number("uSegmentSide", tables.side);
     gl.uniform4fv(at("uBelow"), tables.below);
     gl.uniform4fv(at("uAbove"), tables.above);
+    number("uLeastBend", tables.leastBend);
     vector("uToLight", frame.toLight);
     gl.uniformMatrix3fv(at("uEdges"), false, view.edges.flat());
     gl.uniformMatrix3fv(at("uRows"), false, view.rows.flat());

@@ -172,11 +172,11 @@ vec4 result() { return vec4(light, 1.0 - transmittance); }
   pre: `
 float lastShare = 0.0, lastPlace, change = 0.0;
 bool divided = false;
-const float kLeastBend = kIntervals / 32.0;
+uniform float uLeastBend;  // in places of the table
 
 bool bends(float from, float place) {
   float bend = abs(place - from - (lastShare != 0.0 ? change : 0.0));
-  return bend * transmittance > kLeastBend && min(from, place) - bend < kIntervals &&
+  return bend * transmittance > uLeastBend && min(from, place) - bend < kIntervals &&
          max(from, place) + bend > 0.0;
 }
 int add(int part, float share, float place) {
