@@ -80,6 +80,7 @@ void GridFile::listVdb() {
   VdbSummary summary = inspectVdb(path_);
   bytes_ = summary.fileBytes;
   metadata_ = std::move(summary.metadata);
+  directory_ = summary.directory;
   for (const auto& grid : summary.grids) {
     grids_.push_back({.name = grid.name,
                       .comparable = grid.isScalar,
@@ -108,8 +109,9 @@ bool GridFile::hasBytes(std::size_t g) const {
 std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
   if (!hasBytes(g)) return std::nullopt;
   if (esvr_) return esvr_->carried[grids_[g].ofEsvr.index];
-  auto grids =
-      readCarried(path_, {&g, 1}, {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});
+  auto grids = readCarried(
+      path_, {&g, 1},
+      {.maxBytes = memory_.maxBytes, .memory = memory_.voxels, .directory = directory_});
   return ofSameFile(std::move(grids.front()));
 }
 
@@ -117,7 +119,8 @@ VolumeGrid GridFile::read(std::size_t g) const {
   const ReadOptions options{.allowEmpty = true,
                             .maxBytes = memory_.maxBytes,
                             .memory = memory_.voxels,
-                            .volumes = kVolumes};
+                            .volumes = kVolumes,
+                            .directory = directory_};
   if (!esvr_) return ofSameFile(readGrid(path_, g, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
@@ -129,8 +132,10 @@ VolumeGrid GridFile::read(std::size_t g) const {
 }
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
-  const ReadOptions options{
-      .maxBytes = memory_.maxBytes, .memory = memory_.voxels, .volumes = kVolumes};
+  const ReadOptions options{.maxBytes = memory_.maxBytes,
+                            .memory = memory_.voxels,
+                            .volumes = kVolumes,
+                            .directory = directory_};
   if (!esvr_) return ofSameFile(readVector(path_, g, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readVector(esvr_->carried[place.index], options);

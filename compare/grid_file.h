@@ -80,6 +80,7 @@ class GridFile {
   std::filesystem::path path_;
   cli::WatchedInputs watched_;
   cli::HostMemory memory_;
+  std::shared_ptr<const vdb::ArchiveDirectory> directory_;  ///< of a .vdb file
   std::uint64_t bytes_ = 0;
   std::vector<ListedGrid> grids_;
   std::vector<GridTraits> traits_;

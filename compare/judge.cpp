@@ -84,6 +84,7 @@ Entry entryOf(const std::filesystem::path& path, const std::string& what, const 
 void requireFigures(const std::filesystem::path& path, const std::string& grid, const Json& json) {
   const std::string where = "grid \"" + grid + "\"";
   if (!json.is_object()) notABaseline(path, where + " is no object with figures");
+  if (json.empty()) notABaseline(path, where + " has no figures");
   for (const auto& item : json.items()) {
     const auto isIt = [&](const Figure& figure) { return figure.key == item.key(); };
     if (std::ranges::none_of(allFigures(), isIt))

@@ -73,8 +73,20 @@ ReadOptions readingOf(const Options& options) {
 
 /// The two files of a comparison.
 struct ComparedFiles {
+  explicit ComparedFiles(const Options& chosen)
+      : options(chosen),
+        written(inspectVdb(chosen.output)),
+        ofReference(inspectVdb(*chosen.reference).directory) {}
+
   const Options& options;
   VdbSummary written;
+  std::shared_ptr<const vdb::ArchiveDirectory> ofReference;
+
+  [[nodiscard]] ReadOptions reading(const std::filesystem::path& path) const {
+    ReadOptions reading = readingOf(options);
+    reading.directory = path == options.output ? written.directory : ofReference;
+    return reading;
+  }
 
   /// True if a written grid has no active voxel, which readGrid and readVector would refuse.
   [[nodiscard]] bool isEmpty(const ComparedGrid& grid) const {
@@ -85,7 +97,7 @@ struct ComparedFiles {
 VolumeMetrics compare(const ComparedFiles& files, const ComparedGrid& grid) {
   const Options& options = files.options;
   const auto read = [&](const auto& path, std::size_t place) {
-    return readGrid(path, place, readingOf(options));
+    return readGrid(path, place, files.reading(path));
   };
   const VolumeGrid reference = read(*options.reference, grid.reference);
   const SparseVolume written =
@@ -100,7 +112,7 @@ VolumeMetrics compare(const ComparedFiles& files, const ComparedGrid& grid) {
 VectorMetrics compareVectorGrid(const ComparedFiles& files, const ComparedGrid& grid) {
   const Options& options = files.options;
   const auto read = [&](const auto& path, std::size_t place) {
-    return readVector(path, place, readingOf(options)).components;
+    return readVector(path, place, files.reading(path)).components;
   };
   const VectorVolume reference = read(*options.reference, grid.reference);
   const VectorVolume written =
@@ -136,7 +148,7 @@ void printErrors(const Options& options, const std::vector<ComparedGrid>& grids,
                  std::ostream& out) {
   cli::Table table({"grid", "PSNR active", "PSNR box", "PSNR T 0.5", "max error", "p99.9 error",
                     "SSIM", "IoU", "mass ref", "mass"});
-  const ComparedFiles files{options, inspectVdb(options.output)};
+  const ComparedFiles files(options);
   for (const auto& grid : grids) addRows(files, grid, table);
   table.print(out);
 }
@@ -326,10 +338,13 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
 }
 
 /// The range of the active values of a grid of the reference.
-std::optional<std::array<float, 2>> rangeIn(const Options& options, const GridSummary& grid,
+std::optional<std::array<float, 2>> rangeIn(const Options& options, const VdbSummary& file,
                                             std::size_t place) {
+  const GridSummary& grid = file.grids[place];
   if (grid.activeVoxels == 0 || !(grid.isScalar || grid.isVector)) return std::nullopt;
-  const ReadOptions read{.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+  const ReadOptions read{.maxBytes = options.memory.maxBytes,
+                         .memory = options.memory.voxels,
+                         .directory = file.directory};
   const VolumeGrid voxels = grid.isVector ? readComponent(*options.reference, place, 0, read)
                                           : readGrid(*options.reference, place, read);
   const ValueRange range = activeRange(voxels.volume);
@@ -344,7 +359,7 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<L
   const auto ofGrids = cli::traitsOf(file);
   auto references = cli::traitsOf(reference);
   cli::addRanges(
-      ofGrids, [&](std::size_t g) { return rangeIn(options, reference.grids[g], g); }, references);
+      ofGrids, [&](std::size_t g) { return rangeIn(options, reference, g); }, references);
   const auto pairs = pairGrids(ofGrids, references);
   std::vector<std::string> names;
   for (const GridTraits& traits : references) names.push_back(traits.name);

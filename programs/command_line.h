@@ -14,6 +14,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include "esvr/error.h"
@@ -108,8 +109,14 @@ class CommandLine {
 template <class T>
 void requireRange(const std::string& option, T value, T low, T high) {
   if (value >= low && value <= high) return;
-  throw UsageError("--" + option + " must be from " + std::to_string(low) + " to " +
-                   std::to_string(high) + ", not " + std::to_string(value));
+  const auto text = [](T number) {
+    if constexpr (std::is_floating_point_v<T>)
+      return shortNumber(number);
+    else
+      return std::to_string(number);
+  };
+  throw UsageError("--" + option + " must be from " + text(low) + " to " + text(high) + ", not " +
+                   text(value));
 }
 
 /// Adds the option --device. Its help text begins with `purpose` and ends with `more`.

@@ -297,27 +297,6 @@ void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
 
 // Drawing.
 
-namespace {
-
-/// Whether a grid of ellipsoids has so much empty space between its voxels that the table of its
-/// blocks of 64^3 voxels, by which rays find bricks, would be too large. Such a grid is decoded at
-/// once, and its bricks are found by a search.
-bool liesFarApart(const Scene& scene) {
-  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
-  constexpr double kBlockSide = 64.0;
-  const auto* const field = std::get_if<Field>(&scene.content);
-  if (field == nullptr || !scene.encoded) return false;
-  const auto blocks = [](std::int32_t low, std::int32_t high) {
-    return (double(high) - double(low)) / kBlockSide + 2.0;
-  };
-  const Box& box = scene.box;
-  return blocks(box.min.x, box.max.x) * blocks(box.min.y, box.max.y) *
-             blocks(box.min.z, box.max.z) >
-         kMostBlocks;
-}
-
-}  // namespace
-
 SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSettings& s) {
   if (scenes.size() == 1) {
     drawAlone(scenes.front(), s);
@@ -331,8 +310,11 @@ SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSetting
 DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& memory) {
   if (const auto* const grid = std::get_if<VolumeGrid>(&scene.content)) return &grid->volume;
   const StoredGrid& stored = *scene.encoded;
-  if (followsFromEllipsoids(stored))
-    return DrawnField{&std::get<Field>(scene.content), voxelRule(stored)};
+  if (followsFromEllipsoids(stored)) {
+    DrawnField drawn{&std::get<Field>(scene.content), voxelRule(stored)};
+    drawn.voxels.memory = memory.voxels;
+    return drawn;
+  }
   decoded_.push_back(decodeGrid(stored, {.maxBytes = memory.maxBytes, .memory = memory.voxels}));
   return &decoded_.back();
 }
@@ -340,7 +322,9 @@ DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& me
 void SceneRenderer::drawAlone(const Scene& scene, const DrawSettings& s) {
   const bool isNano = !s.shaded && (s.device.kind == DeviceKind::kCuda || s.values);
   const auto* voxels = std::get_if<VolumeGrid>(&scene.content);
-  if (!voxels && liesFarApart(scene)) {
+  const auto* const field = std::get_if<Field>(&scene.content);
+  // The renderer of ellipsoids on a CUDA device cannot draw these, but that of NanoVDB grids can.
+  if (field && s.device.kind == DeviceKind::kCuda && liesFarApart(*field, scene.box)) {
     const StoredGrid& stored = *scene.encoded;
     farApart_ = VolumeGrid{
         stored.descriptor,

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "esvr/error.h"
+#include "esvr/grid_coding.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -110,10 +111,12 @@ std::optional<std::uint64_t> ByteShares::of(std::size_t grid) const {
   return least + std::uint64_t(double(divided) * shares_[grid].weight / weightLeft_);
 }
 
-std::uint64_t ByteShares::take(std::size_t grid, const StoredGrid& stored) {
+std::uint64_t ByteShares::take(std::size_t grid, const StoredGrid& stored,
+                               const StoredGrid* previous) {
   if (!left_) return 0;
   const Share& share = shares_[grid];
-  const std::uint64_t bytes = bytesOf(share, stored), allowed = *of(grid) + share.reserved;
+  const std::uint64_t bytes = bytesOf(share, stored, previous),
+                      allowed = *of(grid) + share.reserved;
   if (bytes > allowed) return bytes - allowed;
   left_ = less(*left_ + share.reserved, bytes);
   weightLeft_ -= share.weight;
@@ -121,11 +124,13 @@ std::uint64_t ByteShares::take(std::size_t grid, const StoredGrid& stored) {
   return 0;
 }
 
-std::uint64_t ByteShares::bytesOf(const Share& share, const StoredGrid& stored) {
-  if (share.twins.empty()) return bytesAdded(stored);
+std::uint64_t ByteShares::bytesOf(const Share& share, const StoredGrid& stored,
+                                  const StoredGrid* previous) {
+  const std::uint64_t bytes = bytesInFrame(stored, previous);
+  if (share.twins.empty()) return bytes;
   std::vector<StoredGrid> all{stored};
   for (const auto& descriptor : share.twins) all.push_back(withDescriptor(stored, descriptor));
-  return bytesAddedTogether(std::move(all));
+  return bytes + bytesAddedTogether(std::move(all)) - bytesAdded(stored);
 }
 
 }  // namespace esvr::vdb2esvr

@@ -14,8 +14,8 @@
 namespace esvr::vdb2esvr {
 
 /// Every grid gets the few bytes that the smallest one takes, and grids share the others by their
-/// active voxels. A frame of a sequence without active voxels has no size to keep to. Bytes that a grid does not use go to later grids.
-/// Twins of a grid have no share; the bytes of their records are reserved.
+/// active voxels. A frame of a sequence without active voxels has no size to keep to. Bytes that a grid
+/// does not use go to later grids. Twins of a grid have no share; the bytes of their records are reserved.
 class ByteShares {
  public:
   /// \param carried  grids that the file holds unchanged
@@ -27,8 +27,10 @@ class ByteShares {
   [[nodiscard]] std::optional<std::uint64_t> of(std::size_t grid) const;
 
   /// Subtracts the bytes of a converted grid and of its twins.
+  /// \param previous  the same grid of the previous frame, from which it is predicted; null: none
   /// \return the bytes by which they exceed their share; if there are any, nothing is subtracted
-  [[nodiscard]] std::uint64_t take(std::size_t grid, const StoredGrid& stored);
+  [[nodiscard]] std::uint64_t take(std::size_t grid, const StoredGrid& stored,
+                                   const StoredGrid* previous);
 
  private:
   /// A grid that is not a twin.
@@ -40,7 +42,8 @@ class ByteShares {
 
   void reserve(const Twin& twin);
   /// Bytes of a converted grid with its twins.
-  [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored);
+  [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored,
+                                             const StoredGrid* previous);
 
   std::optional<std::uint64_t> left_;  ///< bytes without those reserved
   double weightLeft_ = 0.0;

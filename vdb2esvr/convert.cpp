@@ -78,6 +78,15 @@ std::string wayOut(const GridSummary& grid) {
 
 // Converting.
 
+const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted) {
+  if (!options.previous) return nullptr;
+  const std::string name = fitted.storedName();
+  std::size_t before = 0;
+  for (const StoredGrid& grid : options.previous->grids)
+    if (grid.descriptor.name == name && before++ == fitted.number) return &grid;
+  return nullptr;
+}
+
 namespace {
 
 void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
@@ -86,17 +95,6 @@ void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedG
                                               {convert.fit, *options.paper}, convert.storage);
   grid.conversion = std::move(made.conversion);
   grid.paper = std::move(made.record);
-}
-
-/// The same grid of the previous frame, which is the one with its number among those that are stored by
-/// its name; null if there is none.
-const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted) {
-  if (!options.previous) return nullptr;
-  const std::string name = fitted.storedName();
-  std::size_t before = 0;
-  for (const StoredGrid& grid : options.previous->grids)
-    if (grid.descriptor.name == name && before++ == fitted.number) return &grid;
-  return nullptr;
 }
 
 /// The goal of a grid. A bound in % of the range of vectors is the same for all components.

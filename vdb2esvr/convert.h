@@ -91,6 +91,10 @@ struct ConvertedGrid {
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
 };
 
+/// The same grid of the previous frame, which is the one with its number among those that are stored by
+/// its name; null if there is none.
+[[nodiscard]] const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted);
+
 /// Reads, converts and measures a grid. A process that only fits does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted
 /// \param expected  a grid that is like this one and that its voxels are to refer to; null: the same

@@ -285,7 +285,8 @@ class FileConversion {
     ConvertedGrid grid = convertWhereItFits(fitted, bytes);
     const auto excessOf = [&]() -> std::uint64_t {
       const BestSoFar completion;
-      return cancelled() ? 0 : shares.take(g, grid.stored());  // no grid follows an interrupted one
+      // No grid follows an interrupted one.
+      return cancelled() ? 0 : shares.take(g, grid.stored(), previousOf(options_, fitted));
     };
     while (const std::uint64_t excess = excessOf()) {
       bytes = *bytes - std::min(*bytes, excess);
@@ -432,17 +433,20 @@ StoreFile writingTo(const Options& options) {
   };
 }
 
-RunRecord convertFile(const Options& given, const FileRun& run) {
+namespace {
+
+RunRecord convertWatched(const Options& given, const FileRun& run,
+                         const cli::WatchedInputs& watched) {
   Ranks* const ranks = run.ranks;
   const CancelToken& cancel = run.cancel;
   const cli::Log& log = run.log;
   cli::Stopwatch watch;
   RunRecord record;
-  const cli::WatchedInputs watched({given.input});
   const CancelScope scope(&cancel);
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
   Options options = given;
+  options.read.directory = record.input.directory;
   GridChoice choice = chooseFor(options, record.input);
   carryInactiveValues(
       options, [&](std::string text) { log.warning(std::move(text)); }, choice);
@@ -475,6 +479,18 @@ RunRecord convertFile(const Options& given, const FileRun& run) {
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;
+}
+
+}  // namespace
+
+RunRecord convertFile(const Options& given, const FileRun& run) {
+  const cli::WatchedInputs watched({given.input});
+  try {
+    return convertWatched(given, run, watched);
+  } catch (const BadInput&) {
+    watched.requireUnchanged();  // what was read may be a mixture of two files
+    throw;
+  }
 }
 
 namespace {

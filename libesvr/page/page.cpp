@@ -117,6 +117,15 @@ void putVoxelSize(Json& json, const Transform& transform) {
   json.raw("]");
 }
 
+/// The edges of a voxel in a camera's space (esvr/camera.h); null for a frustum.
+void putEdges(Json& json, const Transform& transform) {
+  const auto shape = voxelShape(transform.affine);
+  if (!shape) return void(json.raw("null"));
+  json.raw("[");
+  for (const Vec3& edge : shape->edges) json.next().list(edge);
+  json.raw("]");
+}
+
 void putBox(Json& json, const Box& box) {
   json.raw("[");
   for (const Coord corner : {box.min, box.max})
@@ -136,6 +145,7 @@ void putGrid(Json& json, const StoredGrid& grid) {
   json.name("background").number(float(grid.descriptor.background));
   putBox(json.name("box"), grid.activeBox);
   putVoxelSize(json.name("voxelSize"), grid.descriptor.transform);
+  putEdges(json.name("edges"), grid.descriptor.transform);
   json.name("range").list(std::initializer_list<double>{grid.valueMin, grid.valueMax});
   json.name("histogram").raw("null");
   putLook(json.name("defaultLook"), lookOf(grid));
@@ -188,6 +198,7 @@ struct Tables : page_tables {
     intervals = TransferTableView::kIntervals;
     low = view.low, scale = view.scale;
     weak_gradient_squared = lightRule({}, View({}, {}), f).weakSquared;  // the same for every view
+    least_bend = view.segments.leastBend;
     static_assert(sizeof(Classified) == 4 * sizeof(float));
     values = &view.entries->r;
     if (sampling.side > 1) fillSegments(view.segments, sampling);
@@ -255,9 +266,11 @@ page_tables* page_make_tables(const page_transfer* transfer, const page_sampling
 
 void page_free_tables(page_tables* tables) { delete static_cast<page::Tables*>(tables); }
 
-void page_fit(const int* box, const double* direction, int orthographic, int width, int height,
-              double* camera) {
+void page_fit(const int* box, const double* edges, const double* direction, int orthographic,
+              int width, int height, double* camera) {
   CameraWish wish;
+  if (edges != nullptr)
+    for (int a = 0; a < 3; ++a) wish.voxel.edges[a] = page::placeAt(edges + 3 * a);
   wish.projection = page::projectionOf(orthographic);
   if (direction != nullptr) wish.direction = page::placeAt(direction);
   const Box voxels{{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};

@@ -64,6 +64,7 @@ struct page_tables {
   int intervals;
   float low, scale;             ///< lowest value and intervals per unit; scale 0: no extent
   float weak_gradient_squared;  ///< the square of the gradient at which half of the shading is left
+  float least_bend;             ///< intervals; SegmentTableView::leastBend
   const float* values;          ///< intervals + 1 times red, green, blue, alpha
   /// side x side times the light of a segment as red, green, blue and alpha, premultiplied. Entry
   /// (i, j), i fastest, is a segment from the value i to the value j of `side` values at equal distances
@@ -85,10 +86,11 @@ void page_free_tables(page_tables* tables);
 
 /// Fits a camera to a box of voxels.
 /// \param box        x0, y0, z0, x1, y1, z1
+/// \param edges      of a voxel in the camera's space, three places; null: a cube
 /// \param direction  from the middle to the eye; null: the usual view
 /// \param camera     output: eye, center, up, and the field of view or the height
-void page_fit(const int* box, const double* direction, int orthographic, int width, int height,
-              double* camera);
+void page_fit(const int* box, const double* edges, const double* direction, int orthographic,
+              int width, int height, double* camera);
 
 /// Checks a camera: eye, center, up, and the field of view or the height.
 esvr_status page_check_camera(const double* camera, int orthographic, int width, int height);

@@ -152,29 +152,26 @@ ESVR_HD inline bool inside(const BrickTableView& a, const Coord& v) {
 /// A ray whose first samples have been added.
 struct RayProgress {
   RayState ray;
-  int next = 0;   ///< first sample that has not been added
+  RayParts parts;
+  int next = 0;   ///< part of the first sample that has not been added
   int level = 0;  ///< place of that sample's level in a LevelScene
   Shade shade;    ///< at the last sample that was added; used if the scene is shaded
 };
 
 /// What a RayProgress has besides the channels of its pixel and its shade, in few bytes. A ray that
 /// waits for bricks keeps its color and its transmittance in its pixel, which is written when the
-/// ray ends. Of the last sample that was added, only its value matters, and whether it is the one
-/// before the next sample.
+/// ray ends. The last sample that was added is the one before the next, or there is none because
+/// the ray is in empty space.
 struct KeptRay {
-  enum class Last : std::uint8_t { kNone, kBefore, kEarlier };
-
-  float lastValue;
+  float lastValue, change;
   int next;  ///< below 0: the ray has ended
   std::uint8_t level;
-  Last last;
+  bool divided, hasLast;
 
-  [[nodiscard]] ESVR_HD static KeptRay ended() { return {0.0f, -1, 0, Last::kNone}; }
+  [[nodiscard]] ESVR_HD static KeptRay ended() { return {0.0f, 0.0f, -1, 0, false, false}; }
   ESVR_HD static KeptRay of(const RayProgress& at) {
-    const bool isBefore = at.ray.last == std::uint32_t(at.next) - 1;
-    const Last last =
-        at.ray.last == RayState::kNone ? Last::kNone : (isBefore ? Last::kBefore : Last::kEarlier);
-    return {at.ray.lastValue, at.next, std::uint8_t(at.level), last};
+    return {at.ray.lastValue,       at.parts.change,  at.next,
+            std::uint8_t(at.level), at.parts.divided, at.ray.last != RayState::kNone};
   }
   /// \param channels  channelsOf() the ray
   [[nodiscard]] ESVR_HD RayProgress progress(const PixelColor& channels) const {
@@ -182,8 +179,8 @@ struct KeptRay {
     at.ray.r = channels.r, at.ray.g = channels.g, at.ray.b = channels.b;
     at.ray.transmittance = channels.alpha;
     at.ray.lastValue = lastValue;
-    at.ray.last = last == Last::kNone ? RayState::kNone
-                                      : std::uint32_t(next) - (last == Last::kBefore ? 1u : 2u);
+    at.parts = {change, divided};
+    if (hasLast) at.ray.last = std::uint32_t(next - at.parts.apart());
     at.next = next, at.level = level;
     return at;
   }
@@ -201,7 +198,7 @@ struct AllBricksAreThere {
 
 /// A sample and where its value comes from.
 struct BrickSample {
-  const float* values;  ///< of the brick
+  const float* values;  ///< of the brick; not used if the value is the background
   Coord low;            ///< lowest corner of the brick
   FloatPlace place;
   float value;
@@ -212,6 +209,9 @@ struct BrickSample {
 struct UnlitSamples {
   ESVR_HD void add(const SampleRule& rule, const BrickSample& sample, RayProgress& at) const {
     rule.add(at.ray, sample.value, sample.number);
+  }
+  ESVR_HD void addEmpty(const SampleRule& rule, float length, RayProgress& at) const {
+    rule.addEmpty(at.ray, NoShades{}, length);
   }
 };
 /// Adds samples whose colors are lit by their gradients.
@@ -225,7 +225,31 @@ struct LitSamples {
     rule.add(at.ray, sample.value, sample.number, Shades{at.shade, shade});
     at.shade = shade;
   }
+  ESVR_HD void addEmpty(const SampleRule& rule, float length, RayProgress& at) const {
+    rule.addEmpty(at.ray, Shades{at.shade, at.shade}, length);
+  }
 };
+
+namespace brick_march {
+
+/// Adds a sample, which may be empty space, or begins to divide the segment before it.
+/// \return the part of the next sample to add
+template <class Adding>
+ESVR_HD inline int addSample(const SampleRule& rule, const BrickSample& sample, int part,
+                             RayProgress& at, const Adding& adding) {
+  const SampleNumber& number = sample.number;
+  if (rule.bends(at.ray, at.parts, number, sample.value)) return at.parts.divide(part);
+  if (sample.value != rule.background) {
+    const float before = rule.valueBefore(at.ray, number);
+    adding.add(rule, sample, at);
+    at.parts.change = (sample.value - before) * float(kSegmentParts / at.parts.apart());
+  } else if (at.ray.last != RayState::kNone) {
+    adding.addEmpty(rule, number.length, at);
+  }
+  return at.parts.next(part);
+}
+
+}  // namespace brick_march
 
 /// Adds samples to a ray until it ends or meets a brick that is missing.
 /// \param scene    its box and view are relative to the table's origin
@@ -243,9 +267,12 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
   Found found = nothingAt({-1, -1, -1});
   const float* values = nullptr;
   bool looksAhead = false;
-  for (int i = at.next > samples.begin ? at.next : samples.begin;
-       i < samples.end && scene.rule.open(at.ray);) {
-    const FloatPlace place = samples.at(i);
+  if (at.next == 0 && at.ray.last != RayState::kNone &&
+      at.ray.last + kSegmentParts != std::uint32_t(samples.firstPart()))
+    adding.addEmpty(scene.rule, 1.0f, at);  // of another level, with empty space behind it
+  for (int part = at.next > 0 ? at.next : samples.start(at.parts);
+       part <= samples.lastPart && scene.rule.open(at.ray);) {
+    const FloatPlace place = samples.at(part);
     const Coord cell = cellOf(place);
     if (!found.contains(cell)) {
       // Rounding can move a place beyond the box.
@@ -256,19 +283,20 @@ ESVR_HD inline bool marchBricks(const BrickTableView& table, const Slots& slots,
       values = there && !looksAhead ? slots.values(slot) : nullptr;
       if (there && !looksAhead) visitor.entered(slot);
       if (!there && slot != BrickSlotsView::kVacant) {
-        if (!looksAhead) at.next = i;
+        if (!looksAhead) at.next = part;
         looksAhead = true;
         if (!visitor.wantsMore(found.brick, slot)) return false;
       }
     }
-    if (values == nullptr) {
-      i += samplesToLeave(place, samples.perVoxel, found.low, found.side);
+    // In empty space, a ray that has left its last sample and divides no segment skips samples.
+    if (looksAhead || (values == nullptr && at.ray.last == RayState::kNone && !at.parts.divided)) {
+      part += kSegmentParts * samplesToLeave(place, samples.perVoxel, found.low, found.side);
       continue;
     }
-    const float value = interpolate(values, place, cell);
-    if (value != scene.rule.background)
-      adding.add(scene.rule, {values, found.low, place, value, samples.numberOf(i)}, at);
-    ++i;
+    const float value = values != nullptr && samples.inside(part) ? interpolate(values, place, cell)
+                                                                  : scene.rule.background;
+    const SampleNumber number = samples.numberOf(part, at.parts.apart());
+    part = addSample(scene.rule, {values, found.low, place, value, number}, part, at, adding);
   }
   return !looksAhead;
 }
@@ -392,7 +420,8 @@ ESVR_HD inline SampleRange rangeOf(const LevelScene& s, int place, const SampleR
 /// The index of a sample of level 0 in a level (SampleNumber::index).
 ESVR_HD inline std::uint32_t indexOf(const MarchScene& scene, const Ray& ray, LevelFrame frame,
                                      double sample) {
-  return std::uint32_t(std::int64_t(sample / frame.side() - samplesInScene(scene, ray).first));
+  const double inLevel = sample / frame.side() - samplesInScene(scene, ray).first;
+  return std::uint32_t((std::int64_t(inLevel) + 1) * kSegmentParts);
 }
 
 /// Prepares a ray for the next level.
@@ -403,6 +432,7 @@ ESVR_HD inline void passOn(const LevelScene& s, int column, int row, RayProgress
   from.rule.passOn(at.ray, indexOf(from, from.view.ray(column, row), before, shared),
                    indexOf(to, to.view.ray(column, row), behind, shared),
                    Shades{at.shade, at.shade});
+  at.parts = {2.0f * at.parts.change};  // steps become twice as long
   ++at.level;
   at.next = 0;
 }

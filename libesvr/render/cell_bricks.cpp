@@ -70,7 +70,9 @@ BrickTable makeBrickTable(std::vector<Coord> bricks, std::uint32_t first) {
   for (const Coord brick : bricks) blocks.expand(blockOf(brick));
   if (bricks.empty()) return table;
   if (blocks.volume() > kMaxBlocks)
-    throw UsageError("the voxels lie too far apart to be drawn from bricks");
+    throw UsageError(
+        "the voxels lie too far apart to be drawn from bricks; a grid by itself can be drawn on "
+        "the CPU");
   for (Coord& brick : bricks) brick = brick - blocks.min * kBlockBricks;
   tbb::parallel_sort(bricks, [](Coord a, Coord b) {
     return std::make_tuple(blockOf(a), offsetInBlock(a)) <

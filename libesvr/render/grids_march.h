@@ -57,28 +57,31 @@ struct GridsScene {
 /// A ray whose first samples have been added.
 struct GridsProgress {
   float r = 0.0f, g = 0.0f, b = 0.0f, transmittance = 1.0f;
-  int next = 0;                 ///< first sample that has not been added
-  std::uint32_t inside = 0;     ///< bit g is set if the last sample of grid g is not empty space
-  float last[kMostGrids] = {};  ///< value of that sample
+  int next = 0;                   ///< part of the first sample that has not been added (RayParts)
+  bool divided = false;           ///< as RayParts::divided
+  std::uint32_t inside = 0;       ///< bit g is set if the last sample of grid g is not empty space
+  float last[kMostGrids] = {};    ///< value of that sample
+  float change[kMostGrids] = {};  ///< as RayParts::change, where the bit of the grid is set
 };
 
 /// A GridsProgress that waits, as KeptRay.
 struct KeptGridsRay {
   int next;  ///< below 0: the ray has ended
+  bool divided;
   std::uint32_t inside;
-  float last[kMostGrids];
+  float last[kMostGrids], change[kMostGrids];
 
-  [[nodiscard]] ESVR_HD static KeptGridsRay ended() { return {-1, 0, {}}; }
+  [[nodiscard]] ESVR_HD static KeptGridsRay ended() { return {-1, false, 0, {}, {}}; }
   ESVR_HD static KeptGridsRay of(const GridsProgress& at) {
-    KeptGridsRay kept{at.next, at.inside, {}};
-    for (int g = 0; g < kMostGrids; ++g) kept.last[g] = at.last[g];
+    KeptGridsRay kept{at.next, at.divided, at.inside, {}, {}};
+    for (int g = 0; g < kMostGrids; ++g) kept.last[g] = at.last[g], kept.change[g] = at.change[g];
     return kept;
   }
   [[nodiscard]] ESVR_HD GridsProgress progress(const PixelColor& channels) const {
     GridsProgress at;
     at.r = channels.r, at.g = channels.g, at.b = channels.b, at.transmittance = channels.alpha;
-    at.next = next, at.inside = inside;
-    for (int g = 0; g < kMostGrids; ++g) at.last[g] = last[g];
+    at.next = next, at.divided = divided, at.inside = inside;
+    for (int g = 0; g < kMostGrids; ++g) at.last[g] = last[g], at.change[g] = change[g];
     return at;
   }
 };
@@ -156,27 +159,56 @@ ESVR_HD inline bool look(const GridInScene& grid, const Slots& slots, int number
 }
 
 /// The light of a grid in the segment before a sample, or at the sample (Classification).
+/// \param before, value  of the samples at the segment's ends
+/// \param length         of the segment in steps
 ESVR_HD inline PixelColor lightOf(const GridInScene& grid, Classification classification,
-                                  bool wasInside, float last, bool isInside, float value) {
+                                  float before, float value, bool isInside, float length) {
   if (classification == Classification::kPreIntegrated)
-    return grid.transfer.segments(wasInside ? last : grid.background,
-                                  isInside ? value : grid.background);
+    return grid.transfer.segments(before, value, length);
   if (!isInside) return {0.0f, 0.0f, 0.0f, 0.0f};
   const Classified c = grid.transfer(value);
   return {c.r * c.alpha, c.g * c.alpha, c.b * c.alpha, c.alpha};
+}
+
+/// The values of a grid at the ends of the segment before a sample.
+struct Ends {
+  bool was, is;  ///< whether they are not empty space
+  float before, value;
+
+  ESVR_HD Ends(const GridInScene& grid, int number, const Sample& sample, const GridsProgress& at)
+      : was((at.inside >> number & 1u) != 0),
+        is((sample.inside >> number & 1u) != 0),
+        before(was ? at.last[number] : grid.background),
+        value(is ? sample.value[number] : grid.background) {}
+};
+
+/// Whether the segment before a sample must be divided, as SampleRule::bends() for each grid.
+template <int kGrids>
+ESVR_HD inline bool bends(const GridsScene& s, const Sample& sample, const GridsProgress& at) {
+  if (at.divided || s.scene.rule.classification != Classification::kPreIntegrated) return false;
+  for (int g = 0; g < kGrids; ++g) {
+    const Ends ends(s.grids[g], g, sample, at);
+    if ((ends.was || ends.is) &&
+        s.grids[g].transfer.segments.bends(ends.before, ends.value, ends.was ? at.change[g] : 0.0f,
+                                           at.transmittance))
+      return true;
+  }
+  return false;
 }
 
 /// Adds a sample to a ray, with the segment before it.
 template <int kGrids>
 ESVR_HD inline void add(const GridsScene& s, const Sample& sample, GridsProgress& at) {
   LightMixture mixture;
+  const float partsInStep = at.divided ? float(kSegmentParts) : 1.0f, length = 1.0f / partsInStep;
   for (int g = 0; g < kGrids; ++g) {
-    const bool was = (at.inside >> g & 1u) != 0, is = (sample.inside >> g & 1u) != 0;
-    if (was || is)
-      mixture.add(
-          lightOf(s.grids[g], s.scene.rule.classification, was, at.last[g], is, sample.value[g]),
-          s.grids[g].absorbs);
-    if (is) at.last[g] = sample.value[g];
+    const Ends ends(s.grids[g], g, sample, at);
+    if (ends.was || ends.is)
+      mixture.add(lightOf(s.grids[g], s.scene.rule.classification, ends.before, ends.value, ends.is,
+                          length),
+                  s.grids[g].absorbs);
+    at.last[g] = ends.value;
+    at.change[g] = (ends.value - ends.before) * partsInStep;
   }
   at.inside = sample.inside;
   const PixelColor light = mixture.total();
@@ -199,23 +231,37 @@ ESVR_HD inline bool marchGrids(const GridsScene& s, const Slots* slots, const Ma
   using namespace grids_march;
   Cursor cursors[kGrids];
   bool looksAhead = false;
-  for (int i = at.next > samples.begin ? at.next : samples.begin;
-       i < samples.end && !(at.transmittance < s.scene.rule.minTransmittance);) {
+  RayParts parts{0.0f, at.divided};
+  int part = at.next > 0 ? at.next : samples.start(parts);
+  at.divided = parts.divided;
+  while (part <= samples.lastPart && !(at.transmittance < s.scene.rule.minTransmittance)) {
     Sample sample;
     bool goesOn = true;
     for (int g = 0; g < kGrids; ++g)
-      goesOn = look(s.grids[g], slots[g], g, samples, samples.at(i), cursors[g], sample, visitor) &&
-               goesOn;
-    if (sample.isMissing && !looksAhead) at.next = i;
+      goesOn =
+          look(s.grids[g], slots[g], g, samples, samples.at(part), cursors[g], sample, visitor) &&
+          goesOn;
+    if (!samples.inside(part)) sample.inside = 0;
+    if (sample.isMissing && !looksAhead) at.next = part;
     looksAhead = looksAhead || sample.isMissing;
     if (!goesOn) return false;
-    if (!looksAhead && (sample.inside | at.inside) != 0) add<kGrids>(s, sample, at);
-    i += sample.advance;
+    if (looksAhead) {
+      part += kSegmentParts * sample.advance;
+      continue;
+    }
+    if (bends<kGrids>(s, sample, at)) {
+      part = parts.divide(part);
+    } else {
+      const bool skips = !at.divided && (sample.inside | at.inside) == 0;
+      if ((sample.inside | at.inside) != 0) add<kGrids>(s, sample, at);
+      part = skips ? part + kSegmentParts * sample.advance : parts.next(part);
+    }
+    at.divided = parts.divided;
   }
   return !looksAhead;
 }
 
-/// The color of a ray that has ended, with the segment from its last sample into empty space.
+/// The color of a ray that has ended.
 template <int kGrids>
 [[nodiscard]] ESVR_HD inline PixelColor finished(const GridsScene& s, GridsProgress at) {
   if (at.inside != 0) grids_march::add<kGrids>(s, {}, at);

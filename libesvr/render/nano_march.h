@@ -13,7 +13,7 @@
 #endif
 
 #include "esvr/vdb_io.h"
-#include "render/sample_rule.h"
+#include "render/brick_march.h"
 
 namespace esvr {
 
@@ -43,23 +43,25 @@ ESVR_HD inline PixelColor marchNano(const nanovdb::NanoGrid<Build>& grid, const 
   const auto accessor = grid.getAccessor();
   const auto sample = ESVR_NANOVDB_MATH::createSampler<1>(accessor);
   const MarchSamples samples = samplesOf(scene, column, row, SampleRange::all());
-  RayState ray;
-  for (int i = samples.begin; i < samples.end && scene.rule.open(ray);) {
-    const FloatPlace at = samples.at(i);
+  RayProgress ray;
+  for (int part = samples.start(ray.parts); part <= samples.lastPart && scene.rule.open(ray.ray);) {
+    const FloatPlace at = samples.at(part);
     const nanovdb::Vec3f place(at.x, at.y, at.z);
     const nanovdb::Coord voxel = nanovdb::Coord::Floor(place);
-    if (accessor.probeLeaf(voxel) == nullptr) {
+    const bool isEmpty = ray.ray.last == RayState::kNone && !ray.parts.divided;
+    if (isEmpty && accessor.probeLeaf(voxel) == nullptr) {
       const std::uint32_t dim = accessor.getDim(voxel, 0);
       if (const int skip = samplesToLeaveNode(at, samples.perVoxel, voxel, dim); skip > 0) {
-        i += skip;
+        part += kSegmentParts * skip;
         continue;
       }
     }
-    const float value = sample(place);
-    if (value != scene.rule.background) scene.rule.add(ray, value, samples.numberOf(i));
-    ++i;
+    const float value = samples.inside(part) ? sample(place) : scene.rule.background;
+    const SampleNumber number = samples.numberOf(part, ray.parts.apart());
+    part = brick_march::addSample(scene.rule, {nullptr, {}, at, value, number}, part, ray,
+                                  UnlitSamples{});
   }
-  return scene.rule.finished(ray);
+  return scene.rule.finished(ray.ray);
 }
 
 }  // namespace esvr

@@ -103,12 +103,6 @@ double behindBrick(const Ray& ray, Coord brick, double step) {
   return std::ceil(within(ray, {low, high}).end / step - kRounding);
 }
 
-/// A ray, and the shade at its last sample.
-struct LitRay {
-  RayState ray;
-  Shade shade;
-};
-
 /// Marches rays through a volume or one of its coarser levels.
 class RayMarch {
  public:
@@ -121,33 +115,64 @@ class RayMarch {
   [[nodiscard]] const MarchScene& scene() const { return scene_; }
 
   /// Adds the samples of a range to a ray.
-  void march(const Ray& ray, const SampleRange& wanted, LitRay& state) const {
-    const SampleRange range = samplesInScene(scene_, ray).both(wanted);
-    if (!(range.first <= range.last)) return;
+  void march(const Ray& ray, const SampleRange& wanted, RayProgress& state) const {
+    const RayInterval t = withinScene(scene_, ray);
+    const SampleRange inScene = samplesIn(t, scene_.step), range = inScene.both(wanted);
+    const bool isBetween = passesBetween(scene_, t, inScene, wanted);
+    if (!(range.first <= range.last) && !isBetween) return;
     // Counted by integers, which grow however large the number of a sample is.
-    const int end = range.countTo(range.last) + 1;
-    for (int i = 0; i < end && scene_.rule.open(state.ray);) i = advance(ray, range, i, state);
+    const int end =
+        isBetween ? 1 : range.countTo(range.last) + (inScene.last < wanted.last ? 2 : 1);
+    const PartRange inside = partsIn(t, scene_.step, range.first);
+    int part = isBetween ? state.parts.divide(kSegmentParts) : kSegmentParts;
+    while (part <= end * kSegmentParts && scene_.rule.open(state.ray))
+      part = advance(ray, range, inside, part, state);
+  }
+  /// The index of a sample, counted from where rays begin.
+  static std::uint32_t indexOf(double sample) {
+    return (sampleNumber(sample).index + 1u) * kSegmentParts;
   }
 
  private:
-  /// Adds sample i of a range to the ray. \return the next sample to visit
-  int advance(const Ray& ray, const SampleRange& range, int i, LitRay& state) const {
-    const double sample = range.first + i;
+  /// Adds a part to the ray (RayParts); part kSegmentParts is the first sample of the range.
+  /// \return the next part to visit
+  int advance(const Ray& ray, const SampleRange& range, const PartRange& inside, int part,
+              RayProgress& state) const {
+    const double fromFirst = double(part) / kSegmentParts - 1.0, sample = range.first + fromFirst;
     const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * scene_.step));
     const Cell cell = cellOf(place);
     const auto brick = brickOf(cell.voxel);
     const VoxelSampler::Corners* corners = sampler_.find(brick);
-    if (corners == nullptr)
-      return std::max(i + 1, range.countTo(behindBrick(ray, brick, scene_.step)));
-    const float value = sampler_.interpolate(*corners, cell);
-    if (value != scene_.rule.background) {
-      const Shade shade = scene_.isShaded ? shadeAt(ray, place, *corners, brick) : Shade{};
-      scene_.rule.add(state.ray, value, sampleNumber(sample, scene_.view.before / scene_.step),
-                      Shades{state.shade, shade});
-      state.shade = shade;
+    if (corners == nullptr && state.ray.last == RayState::kNone && !state.parts.divided) {
+      const int behind = range.countTo(behindBrick(ray, brick, scene_.step)) + 1;
+      return std::max(part + kSegmentParts, behind * kSegmentParts);
     }
-    return i + 1;
+    const bool isThere = corners != nullptr && part >= inside.first && part <= inside.last;
+    const float value = isThere ? sampler_.interpolate(*corners, cell) : scene_.rule.background;
+    const auto apart = std::uint32_t(state.parts.apart());
+    const SampleNumber number{float(sample + scene_.view.before / scene_.step),
+                              indexOf(range.first) + std::uint32_t(part - kSegmentParts), apart,
+                              float(apart) / float(kSegmentParts)};
+    const auto shade = [&] {
+      return scene_.isShaded ? shadeAt(ray, place, *corners, brick) : Shade{};
+    };
+    return brick_march::addSample(scene_.rule, {nullptr, {}, {}, value, number}, part, state,
+                                  Adding<decltype(shade)>{shade});
   }
+  /// Adds samples that are lit by their gradients in the volume.
+  template <class ShadeAt>
+  struct Adding {
+    const ShadeAt& shadeAt;
+
+    void add(const SampleRule& rule, const BrickSample& sample, RayProgress& at) const {
+      const Shade shade = shadeAt();
+      rule.add(at.ray, sample.value, sample.number, Shades{at.shade, shade});
+      at.shade = shade;
+    }
+    void addEmpty(const SampleRule& rule, float length, RayProgress& at) const {
+      rule.addEmpty(at.ray, Shades{at.shade, at.shade}, length);
+    }
+  };
   [[nodiscard]] Shade shadeAt(const Ray& ray, const Vec3& place,
                               const VoxelSampler::Corners& corners, Coord brick) const {
     const Coord corner = brick * kBrickSide;
@@ -198,7 +223,7 @@ class VolumePicture {
   }
 
   [[nodiscard]] PixelColor operator()(int column, int row) const {
-    LitRay state;
+    RayProgress state;
     for (int level = bounds_.first; level <= bounds_.last; ++level) {
       const RayMarch& march = marches_[std::size_t(level - bounds_.first)];
       march.march(march.scene().view.ray(column, row), rangeOf(level), state);
@@ -218,10 +243,11 @@ class VolumePicture {
         level == bounds_.first ? 0.0 : bounds_.begin[std::size_t(level)] / side + 1.0;
     return {first, bounds_.begin[std::size_t(level) + 1] / side};
   }
-  void passOn(const SampleRule& rule, int level, LitRay& state) const {
+  void passOn(const SampleRule& rule, int level, RayProgress& state) const {
     const double shared = bounds_.begin[std::size_t(level) + 1], side = LevelFrame{level}.side();
-    rule.passOn(state.ray, sampleNumber(shared / side).index,
-                sampleNumber(shared / (2.0 * side)).index, Shades{state.shade, state.shade});
+    rule.passOn(state.ray, RayMarch::indexOf(shared / side),
+                RayMarch::indexOf(shared / (2.0 * side)), Shades{state.shade, state.shade});
+    state.parts = {2.0f * state.parts.change};  // steps become twice as long
   }
 
   LevelBounds bounds_;

@@ -1,6 +1,7 @@
 // Makes renderers, which keep voxels from picture to picture, for the CPU or a CUDA device.
 #include "esvr/render.h"
 
+#include <algorithm>
 #include <chrono>
 #include <memory>
 #include <string>
@@ -8,6 +9,7 @@
 
 #include "esvr/error.h"
 #include "render/cuda/cuda_renderers.h"
+#include "render/ellipsoid_view.h"
 #include "render/render_cells.h"
 
 namespace esvr {
@@ -38,20 +40,31 @@ class CpuRenderer final : public Renderer {
   FrameStats stats_;
 };
 
-/// Draws a field on the CPU. Its voxels are kept from picture to picture.
+/// Draws a field on the CPU. Its voxels are kept from picture to picture. Voxels that lie far apart
+/// are decoded at once, and their bricks are found by a search.
 struct FieldDrawing {
   Image operator()(const RenderOptions& options) {
     if (options.between == Between::kSum) return renderField(field, options, voxels);
-    if (!cells) cells = std::make_unique<LazyCells>(field, voxels);
-    return renderCells(*cells, options);
+    if (!cells && !levels) prepare();
+    return levels ? renderLevels(*levels, options) : renderCells(*cells, options);
   }
   void forget() {
     if (cells) cells->forget();
+  }
+  void prepare() {
+    if (!liesFarApart(field, voxels.box)) {
+      cells = std::make_unique<LazyCells>(field, voxels);
+      return;
+    }
+    decoded = std::make_unique<SparseVolume>(revoxelise(field, voxels));
+    levels = std::make_unique<VolumeLevels>(*decoded);
   }
 
   const Field& field;
   const RevoxeliseOptions voxels;
   std::unique_ptr<LazyCells> cells{};
+  std::unique_ptr<SparseVolume> decoded{};
+  std::unique_ptr<VolumeLevels> levels{};  ///< of `decoded`
 };
 
 /// Draws a volume on the CPU. Its levels of detail are kept from picture to picture.
@@ -115,6 +128,19 @@ class CudaFieldRenderers final : public Renderer {
 };
 
 }  // namespace
+
+bool liesFarApart(const Field& field, const Box& wanted) {
+  constexpr double kMostBlocks = double(1 << 26);  // 256 MB
+  const auto box = supportBox(field);
+  if (!box) return false;
+  const Vec3 low = pointOf(wanted.min), high = pointOf(wanted.max);
+  double blocks = 1.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double side = std::min(box->high[a], high[a]) - std::max(box->low[a], low[a]);
+    blocks *= std::max(0.0, side) / kBlockSide + 2.0;
+  }
+  return blocks > kMostBlocks;
+}
 
 std::unique_ptr<Renderer> makeFieldRenderer(const Field& field, const Device& device,
                                             const RendererLimits& limits,

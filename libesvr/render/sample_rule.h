@@ -116,12 +116,19 @@ ESVR_HD inline FloatPlace gradientAt(const FloatPlace& p, float side, ValueAt&& 
 
 // The rule that combines samples.
 
+/// The parts of a segment that is divided (SampleRule::bends). They are so short that a jump of the
+/// values within a part is drawn as if it lay in the middle of the part, and few enough that
+/// surfaces, where segments are divided, cost little.
+inline constexpr int kSegmentParts = 4;
+
 /// A sample's place in the sequence of a ray's samples.
 struct SampleNumber {
   float fromEye;  ///< number of the sample, counted from the eye
   /// The same, counted from any sample of the ray and modulo 2^32. Unlike the float, it tells
   /// whether two samples are consecutive however far away the eye is.
   std::uint32_t index;
+  std::uint32_t apart = 1;  ///< what is subtracted from `index` to get that of the sample before
+  float length = 1.0f;      ///< of the segment between the two, in steps
 };
 /// \param number  of the sample, counted from where rays begin
 /// \param before  samples between the eye and that place
@@ -153,6 +160,27 @@ struct alignas(16) RayState {
     RayState part;
     part.first = kNone;
     return part;
+  }
+};
+
+/// How a ray with divided segments goes on. Marches count parts of segments: sample i is number
+/// (i + 1) kSegmentParts, so that the parts of the segment before the first sample have numbers,
+/// too.
+struct RayParts {
+  float change = 0.0f;   ///< of the value over a step, before the last sample that was added
+  bool divided = false;  ///< true while the parts of a divided segment are added
+
+  /// Parts from the last sample that was added to the next.
+  [[nodiscard]] ESVR_HD int apart() const { return divided ? 1 : kSegmentParts; }
+  /// Begins to divide the segment before a sample. \return its first part
+  ESVR_HD int divide(int part) {
+    divided = true;
+    return part - kSegmentParts + 1;
+  }
+  /// Goes on to the next sample or part.
+  ESVR_HD int next(int part) {
+    if (part % kSegmentParts == 0) divided = false;
+    return part + apart();
   }
 };
 
@@ -188,6 +216,33 @@ struct SampleRule {
     else
       addSegments(ray, value, number, shades);
     ray.last = number.index, ray.lastValue = value;
+  }
+
+  /// Adds a sample of empty space, which ends the segment from the sample before it. Samples that
+  /// follow one of empty space may be left out if they are empty, too.
+  template <class ShadeRule = NoShades>
+  ESVR_HD void addEmpty(RayState& ray, const ShadeRule& shades = {}, float length = 1.0f) const {
+    leave(ray, shades, length);
+    ray.last = RayState::kNone;
+  }
+
+  /// The value of the sample before one that is to be added.
+  [[nodiscard]] ESVR_HD float valueBefore(const RayState& ray, const SampleNumber& number) const {
+    return follows(ray, number) ? ray.lastValue : background;
+  }
+
+  /// Whether the segment before a sample must be divided into kSegmentParts, because its values are
+  /// not linear. They are not where a ray meets a jump, such as a face of a constant body: drawn as
+  /// linear, the face would have stripes that show the places of the samples, and silhouettes would
+  /// be frayed.
+  [[nodiscard]] ESVR_HD bool bends(const RayState& ray, const RayParts& parts,
+                                   const SampleNumber& number, float value) const {
+    if (parts.divided || classification != Classification::kPreIntegrated ||
+        mode == RenderMode::kMaximum || mode == RenderMode::kAverage)
+      return false;
+    if (follows(ray, number))
+      return table.segments.bends(ray.lastValue, value, parts.change, ray.transmittance);
+    return value != background && table.segments.bends(background, value, 0.0f, ray.transmittance);
   }
 
   /// Goes on to samples that follow another rule, for example in another level of detail. Their
@@ -243,21 +298,25 @@ struct SampleRule {
     ray.transmittance *= 1.0f - light.alpha;
     if (mode == RenderMode::kDepth && ray.transmittance < kHalf) ray.g = 1.0f;
   }
+  /// Whether a sample's segment begins at the last sample that was added.
+  ESVR_HD static bool follows(const RayState& ray, const SampleNumber& number) {
+    return ray.last != RayState::kNone && number.index == ray.last + number.apart;
+  }
   /// Adds the segment from the last sample into the empty space behind it.
   template <class ShadeRule>
-  ESVR_HD void leave(RayState& ray, const ShadeRule& shades) const {
+  ESVR_HD void leave(RayState& ray, const ShadeRule& shades, float length = 1.0f) const {
     if (ray.last == RayState::kNone) return;
-    setDistance(ray, ray.r + step);
-    absorb(ray, shades.ofLast(table.segments(ray.lastValue, background)));
+    setDistance(ray, ray.r + step * length);
+    absorb(ray, shades.ofLast(table.segments(ray.lastValue, background, length)));
   }
   /// Adds the light between the last sample and the next one that is not empty space.
   template <class ShadeRule>
   ESVR_HD void addSegments(RayState& ray, float value, const SampleNumber& number,
                            const ShadeRule& shades) const {
-    const bool consecutive = ray.last != RayState::kNone && number.index == ray.last + 1;
-    if (!consecutive) leave(ray, shades);
+    const float before = valueBefore(ray, number);
+    if (!follows(ray, number)) leave(ray, shades);
     setDistance(ray, number.fromEye * step);
-    absorb(ray, shades.ofThis(table.segments(consecutive ? ray.lastValue : background, value)));
+    absorb(ray, shades.ofThis(table.segments(before, value, number.length)));
   }
   /// Adds the light between a ray's samples and those of the next part. \return false if that part
   /// has no samples, or if the ray has none before and has taken over the part
@@ -305,19 +364,42 @@ struct MarchScene {
 /// The samples of a ray inside the box, of which `begin` to `end` - 1 are wanted. Sample i lies at
 /// first + i apart. It is computed from the first sample in the box and not from the eye, so that
 /// float32 is precise enough, and not from the first one that is wanted, so that it does not depend
-/// on what is wanted.
+/// on what is wanted. Parts of segments are counted as RayParts does.
 struct MarchSamples {
   FloatPlace first, apart;
   FloatPlace perVoxel;  ///< samples in a step of a voxel along each axis; 0 where they do not move
   float number;         ///< number of sample 0, counted from the camera's eye
   int begin, end;
+  /// The last part to visit. Where the ray leaves the box or the clip box, it is that of the first
+  /// sample behind, which is empty and ends the last segment.
+  int lastPart;
+  int firstInside, lastInside;  ///< parts between the ends of the ray's way through both boxes
 
-  [[nodiscard]] ESVR_HD FloatPlace at(int i) const {
-    const float n = float(i);
+  [[nodiscard]] ESVR_HD int firstPart() const { return (begin + 1) * kSegmentParts; }
+  /// Begins a ray. Where it passes a clip box between two samples, it begins within a segment.
+  /// \return the first part to visit
+  [[nodiscard]] ESVR_HD int start(RayParts& parts) const {
+    return begin < end || lastPart == 0 ? firstPart() : parts.divide(firstPart());
+  }
+  /// False: the part is empty space, whatever the voxels there are.
+  [[nodiscard]] ESVR_HD bool inside(int part) const {
+    return part >= firstInside && part <= lastInside;
+  }
+  [[nodiscard]] ESVR_HD FloatPlace at(int part) const {
+    const float n = sampleOf(part);
     return {first.x + n * apart.x, first.y + n * apart.y, first.z + n * apart.z};
   }
-  [[nodiscard]] ESVR_HD SampleNumber numberOf(int i) const {
-    return {number + float(i), std::uint32_t(i)};
+  /// \param from  parts from the sample or part before
+  [[nodiscard]] ESVR_HD SampleNumber numberOf(int part, int from) const {
+    constexpr float kLength = 1.0f / float(kSegmentParts);
+    return {number + sampleOf(part), std::uint32_t(part), std::uint32_t(from),
+            float(from) * kLength};
+  }
+
+ private:
+  /// Exact for whole samples.
+  ESVR_HD static float sampleOf(int part) {
+    return float(part - kSegmentParts) * (1.0f / float(kSegmentParts));
   }
 };
 
@@ -326,25 +408,59 @@ ESVR_HD inline float samplesPerVoxel(float apart) {
   return std::fabs(apart) < kStill ? 0.0f : 1.0f / apart;
 }
 
+/// The part of a ray in the box and in the clip box.
+ESVR_HD inline RayInterval withinScene(const MarchScene& s, const Ray& ray) {
+  const RayInterval box = within(ray, s.box);
+  if (!s.clip.given) return box;
+  const RayInterval clip = within(ray, s.clip.box);
+  return {greater(box.begin, clip.begin), lesser(box.end, clip.end)};
+}
 /// The samples of a ray in the box and in the clip box.
 ESVR_HD inline SampleRange samplesInScene(const MarchScene& s, const Ray& ray) {
-  return samplesIn(within(ray, s.box), s.step).both(samplesIn(ray, s.clip, s.step));
+  return samplesIn(withinScene(s, ray), s.step);
+}
+struct PartRange {
+  int first, last;
+};
+/// The parts of a ray's segments in an interval, counted from a sample as RayParts does.
+/// \param first  number of the sample, counted from the ray's origin
+ESVR_HD inline PartRange partsIn(const RayInterval& t, double step, double first) {
+  constexpr double kMost = double(kMostRaySamples + 1) * kSegmentParts;
+  const auto part = [&](double distance) {
+    return clampedTo((distance / step - first + 1.0) * kSegmentParts, 0.0, kMost);
+  };
+  return {int(std::ceil(part(t.begin))), int(std::floor(part(t.end)))};
+}
+
+/// Whether a ray passes the clip box between two of its samples. Elsewhere, such rays are left out:
+/// the values at the faces of the box of all cells are the background.
+/// \param t, range  its part in both boxes, and the samples there
+ESVR_HD inline bool passesBetween(const MarchScene& s, const RayInterval& t,
+                                  const SampleRange& range, const SampleRange& wanted) {
+  return s.clip.given && t.begin < t.end && range.last < range.first && wanted.has(range.first);
 }
 
 /// The samples of the ray of a pixel. \param wanted  further limit on their range
 ESVR_HD inline MarchSamples samplesOf(const MarchScene& s, int column, int row,
                                       const SampleRange& wanted) {
   const Ray ray = s.view.ray(column, row);
-  const SampleRange range = samplesInScene(s, ray);
-  const SampleRange both = range.both(wanted);
-  if (!(both.first <= both.last)) return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0, 0};
+  const RayInterval t = withinScene(s, ray);
+  const SampleRange range = samplesIn(t, s.step), both = range.both(wanted);
+  const bool isBetween = passesBetween(s, t, range, wanted);
+  if (!(both.first <= both.last) && !isBetween)
+    return {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, 0.0f, 0, 0, 0, 0, 0};
   const FloatPlace apart = floatPlace(scaled(ray.direction, s.step));
+  const PartRange inside = partsIn(t, s.step, range.first);
+  const int end = isBetween ? 0 : range.countTo(both.last) + 1;
   return {floatPlace(sum(ray.origin, scaled(ray.direction, range.first * s.step))),
           apart,
           {samplesPerVoxel(apart.x), samplesPerVoxel(apart.y), samplesPerVoxel(apart.z)},
           float(range.first + s.view.before / s.step),
-          range.countTo(both.first),
-          range.countTo(both.last) + 1};
+          isBetween ? 0 : range.countTo(both.first),
+          end,
+          (range.last < wanted.last ? end + 1 : end) * kSegmentParts,
+          inside.first,
+          inside.last};
 }
 
 ESVR_HD inline float samplesToFace(float place, float perVoxel, int low, int high) {

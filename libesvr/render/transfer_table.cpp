@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 namespace esvr {
@@ -10,6 +11,10 @@ namespace {
 constexpr int kIntervals = SegmentSpan::kIntervals;
 constexpr int kExtinction = SegmentEntry::kExtinction;
 constexpr int kSamplesOfInterval = 4;  // values at which an interval is sampled
+
+/// Bends that are neglected (SegmentTableView::bends), as a share of the table, where a step of the most
+/// opaque value hides what is behind it. With a linear opacity, that of a segment then errs by less than this.
+constexpr double kLeastBend = 1.0 / 16.0;
 
 Classified classified(const TransferFunction& f, double value, double length) {
   const Rgb color = colorAt(f.colors, value);
@@ -80,6 +85,9 @@ void TransferTable::integrate(const TransferFunction& f, double length) {
   const ValueExtent extent = extentOf(f);
   segmentScale_ = extent.flat() ? 1.0f : scale_;
   const auto means = meansOf(f, extent, length);
+  double most = 0.0;
+  for (const Channels& mean : means) most = std::max(most, mean[kExtinction]);
+  leastBend_ = extent.flat() ? 0.0f : float(kLeastBend * kIntervals / -std::expm1(-most));
   double total = 0.0;
   for (int i = 1; i <= kIntervals; ++i) total += means[std::size_t(i)][kExtinction];
   const double unitsOfOne = total > 0.0 ? std::numeric_limits<std::uint32_t>::max() / total : 0.0;
@@ -98,7 +106,8 @@ void TransferTable::integrate(const TransferFunction& f, double length) {
 }
 
 TransferTableView TransferTable::on(const Classified* values, const SegmentEntry* segments) const {
-  return {values, low_, scale_, nan_, {segments, low_, segmentScale_, unit_, nanSegment_}};
+  return {
+      values, low_, scale_, nan_, {segments, low_, segmentScale_, unit_, leastBend_, nanSegment_}};
 }
 
 }  // namespace esvr

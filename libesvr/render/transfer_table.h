@@ -115,26 +115,43 @@ struct SegmentTableView {
   const SegmentEntry* entries;
   float low, scale;  ///< lowest value, and intervals per unit of value
   float unit;        ///< what one unit of the integrals stands for
+  float leastBend;   ///< intervals, infinite for a transparent table; see bends()
   PixelColor nan;
 
   /// The light of the segment from a sample to the next, whose values are a and b. The color of a
   /// segment is the mean of its colors, weighted by their extinction, as if none of its light were
   /// absorbed within it. A segment of high extinction is therefore divided into pieces.
-  [[nodiscard]] ESVR_HD PixelColor operator()(float a, float b) const {
+  /// \param length  of the segment in steps
+  [[nodiscard]] ESVR_HD PixelColor operator()(float a, float b, float length = 1.0f) const {
     if (!(a == a) || !(b == b)) return nan;
     const float from = placeOf(a), to = placeOf(b);
     const PixelColor whole = SegmentSpan(entries, from, to).means(unit);
-    const float pieces = piecesOf(whole.alpha);
+    const float pieces = piecesOf(whole.alpha * length);
     PixelColor all{0.0f, 0.0f, 0.0f, 0.0f};
     if (pieces <= 1.0f) {
-      addBehind(all, whole, 1.0f);
+      addBehind(all, whole, length);
       return all;
     }
-    const float length = 1.0f / pieces, apart = (to - from) * length;
+    const float share = 1.0f / pieces, apart = (to - from) * share;
     for (float p = 0.0f; p < pieces; ++p)
       addBehind(all, SegmentSpan(entries, from + p * apart, from + (p + 1.0f) * apart).means(unit),
-                length);
+                length * share);
     return all;
+  }
+
+  /// Whether the values of a segment are so far from a straight line that its light may be wrong.
+  /// If the values before the segment are linear and have one bend within it, they differ from the
+  /// line between its ends by less than the change along it differs from the change before.
+  /// Values beyond the table look alike, so that bends among them do not matter.
+  /// \param a, b          values of the samples at its ends
+  /// \param changeBefore  of the value over a step before the segment
+  /// \param weight        transmittance in front of the segment
+  [[nodiscard]] ESVR_HD bool bends(float a, float b, float changeBefore, float weight) const {
+    const float bend = std::fabs(b - a - changeBefore) * scale;
+    if (!(bend * weight > leastBend)) return false;
+    const float from = placeOf(a), to = placeOf(b);
+    return (from < to ? from : to) - bend < float(SegmentSpan::kIntervals) &&
+           (from < to ? to : from) + bend > 0.0f;
   }
 
  private:
@@ -223,7 +240,7 @@ class TransferTable {
   std::vector<Classified> values_;
   Classified nan_;
   std::vector<SegmentEntry> segments_;
-  float segmentScale_ = 1.0f, unit_ = 0.0f;  ///< see SegmentTableView
+  float segmentScale_ = 1.0f, unit_ = 0.0f, leastBend_ = 0.0f;  ///< see SegmentTableView
   PixelColor nanSegment_{};
 };
 

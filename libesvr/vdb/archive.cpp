@@ -6,6 +6,7 @@
 #include <openvdb/io/io.h>
 
 #include <numeric>
+#include <utility>
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -49,26 +50,50 @@ bool beginsAsVdb(InputFile& file) {
   return file.read<std::int64_t>() == std::int64_t(openvdb::OPENVDB_MAGIC);
 }
 
-Archive::Archive(InputFile& file) : file_(file) {
+namespace {
+
+void addEntry(ArchiveEntry entry, ArchiveDirectory& directory) {
+  if (entry.parent.empty()) directory.owners.emplace(entry.storedName, directory.entries.size());
+  directory.entries.push_back(std::move(entry));
+}
+
+}  // namespace
+
+Archive::Archive(InputFile& file, std::shared_ptr<const ArchiveDirectory> known)
+    : file_(file), directory_(std::move(known)) {
   initializeOpenVdb();
+  if (!directory_) directory_ = std::make_shared<const ArchiveDirectory>(readDirectory());
+  setVersion();
+}
+
+/// Tells OpenVDB's functions how the file is written.
+void Archive::setVersion() {
+  const ArchiveDirectory& d = *directory_;
+  openvdb::io::setVersion(file_.stream(), {d.libraryMajor, d.libraryMinor}, d.vdbVersion);
+}
+
+ArchiveDirectory Archive::readDirectory() {
   if (!beginsAsVdb(file_)) throw BadInput("is not a VDB file");
-  vdbVersion_ = file_.read<std::uint32_t>();
-  if (vdbVersion_ < kOldestFileVersion)
-    throw BadInput("has VDB format version " + std::to_string(vdbVersion_) + ", older than " +
-                   std::to_string(kOldestFileVersion) + ": save it anew with a current program");
-  const auto major = file_.read<std::uint32_t>();
-  const auto minor = file_.read<std::uint32_t>();
-  openvdb::io::setVersion(file_.stream(), {major, minor}, vdbVersion_);
-  hasPositions_ = file_.read<char>() != 0;
+  ArchiveDirectory directory;
+  directory.vdbVersion = file_.read<std::uint32_t>();
+  if (directory.vdbVersion < kOldestFileVersion)
+    throw BadInput("has VDB format version " + std::to_string(directory.vdbVersion) +
+                   ", older than " + std::to_string(kOldestFileVersion) +
+                   ": save it anew with a current program");
+  directory.libraryMajor = file_.read<std::uint32_t>();
+  directory.libraryMinor = file_.read<std::uint32_t>();
+  openvdb::io::setVersion(file_.stream(), {directory.libraryMajor, directory.libraryMinor},
+                          directory.vdbVersion);
+  const bool hasPositions = file_.read<char>() != 0;
   constexpr std::uint64_t kUuidBytes = 36;
   file_.skip(kUuidBytes);
 
-  metadata_ = readMetadata(file_);
+  directory.metadata = readMetadata(file_);
   const auto count = file_.read<std::int32_t>();
   if (count < 0) throw BadInput("is damaged: a negative number of grids");
-  if (!hasPositions_) {
-    readStreamedGrids(count);
-    return;
+  if (!hasPositions) {
+    readStreamedGrids(count, directory);
+    return directory;
   }
   for (std::int32_t i = 0; i < count; ++i) {
     ArchiveEntry entry = readNames(file_);
@@ -82,30 +107,28 @@ Archive::Archive(InputFile& file) : file_(file) {
     entry.gridBytes = std::uint64_t(next - gridAt);
     entry.blocksAt = std::uint64_t(blocksAt);
     file_.seek(std::uint64_t(next));
-    addEntry(std::move(entry));
+    addEntry(std::move(entry), directory);
   }
+  return directory;
 }
 
-Archive::Archive(InputFile& file, const CarriedGrid& grid)
-    : file_(file), vdbVersion_(grid.vdbVersion) {
+Archive::Archive(InputFile& file, const CarriedGrid& grid) : file_(file) {
   initializeOpenVdb();
-  const openvdb::VersionId library{openvdb::OPENVDB_LIBRARY_MAJOR_VERSION,
-                                   openvdb::OPENVDB_LIBRARY_MINOR_VERSION};
-  openvdb::io::setVersion(file_.stream(), library, vdbVersion_);
-  ArchiveEntry& entry = entries_.emplace_back();
+  ArchiveDirectory directory;
+  directory.libraryMajor = openvdb::OPENVDB_LIBRARY_MAJOR_VERSION;
+  directory.libraryMinor = openvdb::OPENVDB_LIBRARY_MINOR_VERSION;
+  directory.vdbVersion = grid.vdbVersion;
+  ArchiveEntry& entry = directory.entries.emplace_back();
   entry.storedName = grid.name;
   entry.treeType = grid.treeType;
   entry.savedAsHalf = grid.savedAsHalf;
   entry.gridBytes = file.size();
   entry.blocksAt = grid.blocksAt;
+  directory_ = std::make_shared<const ArchiveDirectory>(std::move(directory));
+  setVersion();
 }
 
-void Archive::addEntry(ArchiveEntry entry) {
-  if (entry.parent.empty()) owners_.emplace(entry.storedName, entries_.size());
-  entries_.push_back(std::move(entry));
-}
-
-void Archive::readStreamedGrids(std::int32_t count) {
+void Archive::readStreamedGrids(std::int32_t count, ArchiveDirectory& directory) {
   constexpr std::uint64_t kPositions = 3 * sizeof(std::int64_t);  // which are 0
   for (std::int32_t i = 0; i < count; ++i) {
     ArchiveEntry entry = readNames(file_);
@@ -114,7 +137,7 @@ void Archive::readStreamedGrids(std::int32_t count) {
     entry.gridBytes = file_.remaining();
     inGrid(entry.name(), [&] { locate(entry, i + 1 == count); });
     file_.seek(entry.gridAt + entry.gridBytes);
-    addEntry(std::move(entry));
+    addEntry(std::move(entry), directory);
   }
 }
 
@@ -151,9 +174,10 @@ GridHead Archive::readHead(const ArchiveEntry& entry) {
 
 const ArchiveEntry& Archive::treeOwner(const ArchiveEntry& entry) const {
   if (entry.parent.empty()) return entry;
-  const auto parent = owners_.find(entry.parent);
-  if (parent == owners_.end()) throw BadInput("shares the voxels of a grid that is not there");
-  return entries_[parent->second];
+  const auto parent = directory_->owners.find(entry.parent);
+  if (parent == directory_->owners.end())
+    throw BadInput("shares the voxels of a grid that is not there");
+  return entries()[parent->second];
 }
 
 bool isPointTree(const std::string& treeType) {

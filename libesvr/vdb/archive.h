@@ -8,10 +8,13 @@
 /// found by a walk over all trees (tree_walk.h), which reads no voxels. The end of a grid with a
 /// tree that cannot be walked over is known only if it is the last one, which ends with the file.
 
+#include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "core/read_input.h"
 #include "esvr/grid.h"
 #include "vdb/files.h"
 
@@ -40,19 +43,35 @@ struct GridHead {
   std::uint64_t treeAt = 0;       ///< position of the tree; a grid with a parent has none
 };
 
+/// What the directory of a file says. It takes a look at every grid to read it, so that it is kept for
+/// those who read many grids of a file.
+struct ArchiveDirectory {
+  std::optional<FileStamp> stamp{};  ///< of the file; none: the bytes of a carried grid
+  std::uint32_t libraryMajor = 0, libraryMinor = 0;  ///< version of the library that has written it
+  std::uint32_t vdbVersion = 0;
+  std::vector<MetaItem> metadata{};
+  std::vector<ArchiveEntry> entries{};
+  /// Entries with a tree of their own, by their stored names.
+  std::unordered_map<std::string, std::size_t> owners{};
+};
+
 class Archive {
  public:
+  /// \param known  the directory of this very file; null: it is read
   /// \throws BadInput  the file is not a .vdb, is too old, or is damaged; it was written to a stream
   ///                   and has a tree before its last grid that cannot be walked over
-  explicit Archive(InputFile& file);
+  explicit Archive(InputFile& file, std::shared_ptr<const ArchiveDirectory> known = nullptr);
   /// The archive of one grid that is carried.
   /// \param file  the grid's bytes
   Archive(InputFile& file, const CarriedGrid& grid);
 
   InputFile& file() { return file_; }
-  [[nodiscard]] std::uint32_t vdbVersion() const { return vdbVersion_; }
-  [[nodiscard]] const std::vector<MetaItem>& metadata() const { return metadata_; }
-  [[nodiscard]] const std::vector<ArchiveEntry>& entries() const { return entries_; }
+  [[nodiscard]] const std::shared_ptr<const ArchiveDirectory>& directory() const {
+    return directory_;
+  }
+  [[nodiscard]] std::uint32_t vdbVersion() const { return directory_->vdbVersion; }
+  [[nodiscard]] const std::vector<MetaItem>& metadata() const { return directory_->metadata; }
+  [[nodiscard]] const std::vector<ArchiveEntry>& entries() const { return directory_->entries; }
   /// \throws BadInput  the head is damaged or ends behind its grid
   GridHead readHead(const ArchiveEntry& entry);
   /// The entry that holds an entry's tree, which is the entry itself unless it has a parent.
@@ -60,17 +79,13 @@ class Archive {
   [[nodiscard]] const ArchiveEntry& treeOwner(const ArchiveEntry& entry) const;
 
  private:
-  void addEntry(ArchiveEntry entry);
-  void readStreamedGrids(std::int32_t count);
+  [[nodiscard]] ArchiveDirectory readDirectory();
+  void readStreamedGrids(std::int32_t count, ArchiveDirectory& directory);
   void locate(ArchiveEntry& entry, bool isLast);
+  void setVersion();
 
   InputFile& file_;
-  std::uint32_t vdbVersion_ = 0;
-  bool hasPositions_ = true;  ///< false: the file was written to a stream
-  std::vector<MetaItem> metadata_;
-  std::vector<ArchiveEntry> entries_;
-  std::unordered_map<std::string, std::size_t>
-      owners_;  ///< entries with a tree of their own, by their stored names
+  std::shared_ptr<const ArchiveDirectory> directory_;
 };
 
 /// True if the file begins as a .vdb file does.

@@ -578,17 +578,18 @@ VdbSummary inspectOpenVdb(InputFile& file) {
   Surveys surveys;
   for (std::size_t place = 0; place < archive.entries().size(); ++place)
     summary.grids.push_back(std::move(listGrid(archive, place, surveys).summary));
+  summary.directory = archive.directory();
   return summary;
 }
 
 VolumeGrid readOpenVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options) {
-  Archive archive(file);
+  Archive archive(file, options.directory);
   return readListedGrid(archive, listGrid(archive, place), options);
 }
 
 VolumeGrid readOpenVdbComponent(InputFile& file, std::size_t place, std::size_t component,
                                 const ReadOptions& options) {
-  Archive archive(file);
+  Archive archive(file, options.directory);
   VolumeGrid grid = readListedComponent(archive, listGrid(archive, place), component, options);
   grid.descriptor.name = componentName(grid.descriptor.name, component);
   if (component > 0) grid.descriptor.metadata.clear();
@@ -596,18 +597,18 @@ VolumeGrid readOpenVdbComponent(InputFile& file, std::size_t place, std::size_t 
 }
 
 VectorGrid readOpenVdbVector(InputFile& file, std::size_t place, const ReadOptions& options) {
-  Archive archive(file);
+  Archive archive(file, options.directory);
   return readListedVector(archive, listGrid(archive, place), options);
 }
 
 PackedGrid readOpenVdbPacked(InputFile& file, std::size_t place, const ReadOptions& options) {
-  Archive archive(file);
+  Archive archive(file, options.directory);
   return readListedPacked(archive, listGrid(archive, place), options);
 }
 
 std::vector<CarriedGrid> readOpenVdbCarried(InputFile& file, std::span<const std::size_t> places,
                                             const ReadOptions& options) {
-  Archive archive(file);
+  Archive archive(file, options.directory);
   MemoryBudget budget(options.maxBytes);
   std::vector<CarriedGrid> grids;
   for (const std::size_t place : places)

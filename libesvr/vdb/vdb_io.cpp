@@ -1,5 +1,6 @@
 #include "esvr/vdb_io.h"
 
+#include <memory>
 #include <utility>
 
 #include "core/atomic_file.h"
@@ -39,6 +40,12 @@ auto readingFrom(const std::filesystem::path& path, const Read& read) {
     watched.requireUnchanged();
     throw;
   }
+}
+
+/// Options whose directory is that of the file as it is now, or none.
+ReadOptions currently(const std::filesystem::path& path, ReadOptions options) {
+  if (options.directory && options.directory->stamp != stampOf(path)) options.directory = nullptr;
+  return options;
 }
 
 FileFormat formatNamedBy(const std::filesystem::path& path) {
@@ -94,12 +101,18 @@ std::string notAFloatType(const std::string& valueType) {
 namespace esvr {
 
 VdbSummary inspectVdb(const std::filesystem::path& path) {
+  const auto stamp = stampOf(path);
   return vdb::readingFrom(path, [&](vdb::InputFile& file) {
     VdbSummary summary = vdb::formatOf(file) == vdb::FileFormat::kOpenVdb
                              ? vdb::inspectOpenVdb(file)
                              : vdb::inspectNanoVdb(file);
     const GridNames names(vdb::storedNames(summary));
     for (std::size_t i = 0; i < names.size(); ++i) summary.grids[i].uniqueName = names.unique(i);
+    if (summary.directory) {
+      vdb::ArchiveDirectory stamped = *summary.directory;
+      stamped.stamp = stamp;
+      summary.directory = std::make_shared<const vdb::ArchiveDirectory>(std::move(stamped));
+    }
     return summary;
   });
 }
@@ -108,7 +121,7 @@ VolumeGrid readGrid(const std::filesystem::path& path, std::size_t place,
                     const ReadOptions& options) {
   return vdb::readingFrom(path, [&](vdb::InputFile& file) {
     return vdb::formatOf(file) == vdb::FileFormat::kOpenVdb
-               ? vdb::readOpenVdbGrid(file, place, options)
+               ? vdb::readOpenVdbGrid(file, place, vdb::currently(path, options))
                : vdb::readNanoVdbGrid(file, place, options);
   });
 }
@@ -124,7 +137,7 @@ PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
                       const ReadOptions& options) {
   return vdb::readingFrom(path, [&](vdb::InputFile& file) {
     if (vdb::formatOf(file) == vdb::FileFormat::kOpenVdb)
-      return vdb::readOpenVdbPacked(file, place, options);
+      return vdb::readOpenVdbPacked(file, place, vdb::currently(path, options));
     ReadOptions anyNumber = options;
     anyNumber.allowEmpty = true;
     const VolumeGrid grid = vdb::readNanoVdbGrid(file, place, anyNumber);
@@ -143,7 +156,7 @@ PackedGrid readPacked(const std::filesystem::path& path, const std::string& name
 VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
                          std::size_t component, const ReadOptions& options) {
   return vdb::readVectors(path, [&](vdb::InputFile& file) {
-    return vdb::readOpenVdbComponent(file, place, component, options);
+    return vdb::readOpenVdbComponent(file, place, component, vdb::currently(path, options));
   });
 }
 
@@ -154,8 +167,9 @@ VolumeGrid readComponent(const std::filesystem::path& path, const std::string& n
 
 VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
                       const ReadOptions& options) {
-  return vdb::readVectors(
-      path, [&](vdb::InputFile& file) { return vdb::readOpenVdbVector(file, place, options); });
+  return vdb::readVectors(path, [&](vdb::InputFile& file) {
+    return vdb::readOpenVdbVector(file, place, vdb::currently(path, options));
+  });
 }
 
 VectorGrid readVector(const std::filesystem::path& path, const std::string& name,
@@ -166,8 +180,9 @@ VectorGrid readVector(const std::filesystem::path& path, const std::string& name
 std::vector<CarriedGrid> readCarried(const std::filesystem::path& path,
                                      std::span<const std::size_t> places,
                                      const ReadOptions& options) {
-  return vdb::readingFrom(
-      path, [&](vdb::InputFile& file) { return vdb::readOpenVdbCarried(file, places, options); });
+  return vdb::readingFrom(path, [&](vdb::InputFile& file) {
+    return vdb::readOpenVdbCarried(file, places, vdb::currently(path, options));
+  });
 }
 
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,

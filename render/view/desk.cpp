@@ -29,6 +29,12 @@ json voxelSizeOf(const Transform& transform) {
   return sizes;
 }
 
+/// The edges of a voxel in a camera's space (esvr/camera.h); null for a frustum.
+json edgesOf(const Transform& transform) {
+  const auto shape = voxelShape(transform.affine);
+  return shape ? json(shape->edges) : json(nullptr);
+}
+
 /// The look that esvr-render gives the grid without options.
 json usualLook(const ShownGrid& grid) {
   const TransferFunction f = render::renderOptions({}, grid.outline).transfer;
@@ -50,6 +56,7 @@ json gridJson(const ShownGrid& grid) {
           {"background", scene.background},
           {"box", {{box.min.x, box.min.y, box.min.z}, {box.max.x, box.max.y, box.max.z}}},
           {"voxelSize", voxelSizeOf(scene.transform)},
+          {"edges", edgesOf(scene.transform)},
           {"range", {scene.data.min, scene.data.max}},
           {"histogram", nullptr},
           {"defaultLook", usualLook(grid)}};

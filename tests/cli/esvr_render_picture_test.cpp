@@ -55,6 +55,30 @@ TEST_F(EsvrRender, EllipsoidsAreDrawnAsTheirVoxels) {
             60.0);
 }
 
+// The table of blocks between 60 puffs over 60,000 voxels would take gigabytes.
+TEST_F(EsvrRender, EllipsoidsFarApartAreDrawnAsTheirVoxels) {
+  Field field = randomField({.count = 60, .extent = 60'000.0, .smallest = 3.0, .aspect = 2.0});
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  for (float& i : e.intensity) i = 0.5f + 0.5f * std::abs(i);
+  const VolumeGrid grid{density(), revoxelise(field, {}), 0};
+  writeEsvr(folder_ / "far.esvr", {{}, {makeStoredGrid(density(), grid.volume, field)}});
+  writeGrids(folder_ / "far.vdb", {}, std::span(&grid, 1));
+  const auto place = [&](double away) {
+    return std::to_string(e.center[0][7]) + "," + std::to_string(e.center[1][7]) + "," +
+           std::to_string(e.center[2][7] + away);
+  };
+  const std::vector<std::string> near{"--eye",        place(60.0), "--center", place(0.0),
+                                      "--background", "0,0,0",     "--device", "cpu"};
+  auto sum = near;
+  sum.insert(sum.end(), {"--between", "sum"});
+  const Pixels expected = picture("far.vdb", near);
+  EXPECT_GE(psnrOf(picture("far.esvr", near), expected), 60.0);
+  EXPECT_GE(psnrOf(picture("far.esvr", sum), expected), 20.0) << "roughly";
+  EXPECT_LT(psnrOf(picture("far.esvr", {"--background", "0,0,0", "--device", "cpu"}), expected),
+            30.0)
+      << "the puff must be seen";
+}
+
 // The mask leaves out half of the volume, which the ellipsoids alone would show.
 TEST_F(EsvrRender, AStoredMaskIsDrawn) {
   EsvrFile file = readEsvr(folder_ / "in.esvr");

@@ -16,6 +16,7 @@
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
 
@@ -136,6 +137,28 @@ TEST_F(OneFile, hasAnEmptyFrameInTheMiddle) {
   ASSERT_EQ(esvr2vdb({at("out.esvr"), at("back.@.vdb")}).exitCode, 0);
   EXPECT_EQ(inspectVdb(at("back.2.vdb")).grids.at(0).activeVoxels, 0u);
   EXPECT_GT(inspectVdb(at("back.3.vdb")).grids.at(0).activeVoxels, 0u);
+}
+
+// A frame that is predicted may use its bytes for more quality than the frame that it refers to. What counts
+// are its bytes in the sequence, and not those of the same grid in a file of its own.
+TEST_F(OneFile, keepsToTheSizeOfEveryFrame) {
+  writeFrame(1, {{}});
+  for (const int frame : {2, 3}) writeFrame(frame, {{.voxels = test::cloud(10)}});
+  const SparseVolume source = readGrid(at("in.2.vdb"), "density").volume;
+  for (const auto& goal : {Words{"--size", "1KB"}, Words{"--ratio", "40"}}) {
+    Words words{at("in.@.vdb"), at("out.esvr"), "--device", "cpu", "--force"};
+    words.insert(words.end(), goal.begin(), goal.end());
+    const auto run = vdb2esvr(words);
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    SequenceReader reader(at("out.esvr"));
+    ASSERT_EQ(reader.frames().size(), 3u);
+    const auto most = goal[0] == "--size" ? 1024u : std::uint64_t(sizeOf("in.3.vdb") / 40);
+    EXPECT_LE(reader.frames()[2].bytes, most);
+    const auto errorOf = [&](std::int64_t frame) {
+      return compareVolumes(source, decodeGrid(reader.read(frame).grids.at(0)), {}).maxError;
+    };
+    EXPECT_LE(errorOf(3), errorOf(2));
+  }
 }
 
 TEST_F(OneFile, holdsOrSkipsMissingFrames) {

@@ -214,3 +214,19 @@ def test_real_files_are_fitted(data, tmp_path):
     assert volume.grid_class == "level set" and esvr.compare(volume, grid).max_error == 0.0
     assert esvr.compare(volume, grid).psnr_t50 is None
     assert grid.render(64, 64, device="cpu").any()
+
+
+def test_pictures_have_the_proportions_of_the_world():
+    def wide(transform):
+        array = np.zeros((12, 12, 12), np.float32)
+        array[2:10, 2:10, 2:10] = 1.0
+        builder = esvr.GridBuilder(transform=transform)
+        builder.add(array)
+        volume = builder.finish().to_volume()
+        shown = volume.render(60, 60, eye=(60, 5, 5), center=(5, 5, 5), colors="grayscale")[..., 3] > 0
+        return np.ptp(np.nonzero(shown.any(axis=0))[0]), np.ptp(np.nonzero(shown.any(axis=1))[0])
+
+    width, height = wide(np.eye(4))
+    assert abs(width - height) <= 1
+    wider = wide(np.diag([1.0, 1.0, 2.0, 1.0]))
+    assert wider[0] > 1.7 * wider[1] - 2

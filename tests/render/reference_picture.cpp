@@ -12,6 +12,7 @@ namespace esvr::test {
 namespace {
 
 constexpr int kIntervals = 1 << 16;
+constexpr int kParts = 4;  // of a divided segment
 constexpr double kMaxExtinction = 64.0, kThin = 0.25, kMaxPieces = 16.0;
 constexpr std::size_t kExtinction = 3;
 
@@ -34,6 +35,8 @@ Integrals::Integrals(const TransferFunction& f, double length)
   for (int i = 0; i < kIntervals; ++i)
     means_.push_back(at(high > low_ ? low_ + (i + 0.5) / scale_ : low_));
   means_.push_back(at(high));
+  for (const Channels& mean : means_)
+    mostExtinction_ = std::max(mostExtinction_, mean[kExtinction]);
   Channels before{};
   for (std::size_t n = 0; n < means_.size(); ++n) {
     before_.push_back(before);
@@ -59,20 +62,34 @@ Channels Integrals::meanBetween(double a, double b) const {
   return mean;
 }
 
-void LightOnRay::add(double value) {
-  if (classification_ == Classification::kPreIntegrated) addSegment(last_, value);
+bool Integrals::bends(double a, double b, double changeBefore, double weight) const {
+  constexpr double kLeastBend = 1.0 / 16.0;
+  const double bend = std::abs(b - a - changeBefore) * scale_;
+  const double opacity = -std::expm1(-mostExtinction_);
+  if (!(bend * weight * opacity > kLeastBend * kIntervals)) return false;
+  return placeOf(std::min(a, b)) - bend < kIntervals && placeOf(std::max(a, b)) + bend > 0.0;
+}
+
+void LightOnRay::add(double value, double length) {
+  if (classification_ == Classification::kPreIntegrated) addSegment(last_, value, length);
   if (classification_ == Classification::kPost && value != background_)
     absorb(integrals_.at(value), 1.0);
+  change_ = value == background_ ? 0.0 : (value - last_) / length;
   last_ = value;
 }
 
-void LightOnRay::addSegment(double a, double b) {
+bool LightOnRay::bends(double value) const {
+  return classification_ == Classification::kPreIntegrated &&
+         integrals_.bends(last_, value, change_, light_.transmittance);
+}
+
+void LightOnRay::addSegment(double a, double b, double length) {
   if (a == background_ && b == background_) return;
-  const double extinction = integrals_.meanBetween(a, b)[kExtinction];
+  const double extinction = integrals_.meanBetween(a, b)[kExtinction] * length;
   const double pieces = std::clamp(std::ceil(extinction / kThin), 1.0, kMaxPieces);
   for (double p = 0; p < pieces; ++p)
     absorb(integrals_.meanBetween(a + (b - a) * p / pieces, a + (b - a) * (p + 1) / pieces),
-           1.0 / pieces);
+           length / pieces);
 }
 
 void LightOnRay::absorb(const Channels& mean, double length) {
@@ -115,8 +132,16 @@ double valueOf(const Ellipsoid& e, const Vec3& place) {
 Light lightAlong(const Ray& ray, const SampledScene& scene, const Integrals& integrals,
                  const RenderOptions& o) {
   LightOnRay light(integrals, scene.background, o.classification);
-  for (int j = 0; j * o.step <= scene.farthest; ++j)
-    light.add(scene.value(sum(ray.origin, scaled(ray.direction, j * o.step))));
+  const auto valueAt = [&](double sample) {
+    if (sample < 0.0) return scene.background;  // before the eye
+    return scene.value(sum(ray.origin, scaled(ray.direction, sample * o.step)));
+  };
+  for (int j = 0; j * o.step <= scene.farthest; ++j) {
+    const double value = valueAt(j);
+    const int parts = scene.divides && light.bends(value) ? kParts : 1;
+    for (int p = 1; p <= parts; ++p)
+      light.add(p == parts ? value : valueAt(j - 1 + double(p) / parts), 1.0 / parts);
+  }
   return light.light();
 }
 

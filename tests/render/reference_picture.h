@@ -25,6 +25,8 @@ class Integrals {
 
   [[nodiscard]] Channels meanBetween(double a, double b) const;
   [[nodiscard]] Channels at(double value) const { return channelsAt(function_, value, length_); }
+  /// Whether a segment whose values bend has light that depends on it (docs/math.md).
+  [[nodiscard]] bool bends(double a, double b, double changeBefore, double weight) const;
 
  private:
   [[nodiscard]] double placeOf(double value) const;
@@ -34,6 +36,7 @@ class Integrals {
   double length_, low_, scale_;
   std::vector<Channels> means_;   ///< of the values below, of each interval, and of those above
   std::vector<Channels> before_;  ///< integrals up to each interval
+  double mostExtinction_ = 0.0;
 };
 
 /// Premultiplied color, and what is left of the light behind.
@@ -51,15 +54,18 @@ class LightOnRay {
         classification_(classification) {}
 
   /// Adds the next sample. Values that are exactly the background are empty space.
-  void add(double value);
+  /// \param length  of the segment before it, in steps
+  void add(double value, double length = 1.0);
+  /// Whether the segment before a sample must be divided (docs/math.md).
+  [[nodiscard]] bool bends(double value) const;
   [[nodiscard]] const Light& light() const { return light_; }
 
  private:
-  void addSegment(double a, double b);
+  void addSegment(double a, double b, double length);
   void absorb(const Channels& mean, double length);
 
   const Integrals& integrals_;
-  double background_, last_;
+  double background_, last_, change_ = 0.0;
   Classification classification_;
   Light light_;
 };
@@ -71,6 +77,7 @@ struct SampledScene {
   ValueAtPlace value;
   double background = 0.0;
   double farthest = 0.0;  ///< distance of the last sample
+  bool divides = true;    ///< false for the sum of ellipsoids, whose segments are not divided
 };
 
 [[nodiscard]] ValueAtPlace sumOfEllipsoids(const Field& field);

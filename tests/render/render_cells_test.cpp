@@ -166,6 +166,33 @@ TEST(RenderCells, DrawsVoxelsThatAreAlwaysActive) {
       60.0);
 }
 
+/// Puffs over 60,000 voxels, with nothing between them.
+Field puffsFarApart() {
+  constexpr double kExtent = 60'000.0;
+  return randomField({.count = 60, .extent = kExtent, .smallest = 3.0, .aspect = 2.0, .seed = 11});
+}
+
+TEST(RenderCells, DrawsEllipsoidsThatLieFarApart) {
+  Field field = puffsFarApart();
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  for (float& intensity : e.intensity) intensity = 0.5f + 0.5f * std::abs(intensity);
+  const SparseVolume volume = revoxelise(field, {});
+  const auto renderer = makeFieldRenderer(field, Device{});
+  for (const std::size_t i : {0u, 17u, 59u}) {
+    const Vec3 puff{e.center[0][i], e.center[1][i], e.center[2][i]};
+    RenderOptions o = optionsFor();
+    o.camera.center = puff, o.camera.eye = {puff[0] + 10.0, puff[1] + 30.0, puff[2] + 60.0};
+    const Image expected = renderVolume(volume, o), drawn = renderer->draw(o);
+    EXPECT_GE(imagePsnr(expected, drawn), kAsked);
+    EXPECT_GT(drawn.rgba[4 * (18 * 50 + 25) + 3], 0.1f) << "the puff in the middle";
+    o.between = Between::kSum;
+    EXPECT_GE(imagePsnr(expected, renderer->draw(o)), 20.0) << "roughly";
+  }
+  RenderOptions all = optionsFor();
+  all.camera = fitCamera(activeBox(volume), {}, all.resolution);
+  EXPECT_GE(imagePsnr(renderVolume(volume, all), renderer->draw(all)), kAsked);
+}
+
 TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = optionsFor({}, {130, 70});

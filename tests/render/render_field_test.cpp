@@ -59,7 +59,7 @@ double agreement(const Field& field, const RenderOptions& o,
     const double value = tone.isOn() ? s * std::sinh(sum(place) / s) : sum(place);
     return range ? std::clamp(value, double(range->min), double(range->max)) : value;
   };
-  const Image expected = referencePicture({clamped, field.background, farthest}, o);
+  const Image expected = referencePicture({clamped, field.background, farthest, false}, o);
   const Image drawn = renderField(field, o, {.tone = tone, .range = range});
   double light = 0.0;
   for (const float v : drawn.rgba) light += v;
@@ -467,7 +467,8 @@ TEST(ClipBox, LeavesWhatIsInIt) {
         if (p[a] < box.low[a] || p[a] > box.high[a]) return 0.0;
       return whole(p);
     };
-    EXPECT_GE(imagePsnr(referencePicture({clipped, 0.0, 300.0}, o), renderField(field, o)), 70.0);
+    EXPECT_GE(imagePsnr(referencePicture({clipped, 0.0, 300.0, false}, o), renderField(field, o)),
+              70.0);
     const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
     EXPECT_GE(imagePsnr(renderField(field, o), renderVolume(volume, o)), 24.0) << "roughly";
     o.between = Between::kVoxels;

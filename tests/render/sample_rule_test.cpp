@@ -14,11 +14,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/image.h"
 #include "esvr/render.h"
 #include "field/random_field.h"
 #include "render/brick_scene.h"
@@ -221,6 +223,102 @@ TEST(Classification, ALevelSetHasNoMoire) {
       rescaled({builtInColorMap("viridis"), {{0.0, 1.0}, {0.5, 1.0}, {0.5, 0.0}, {1.0, 0.0}}},
                {-3.0f, 3.0f});
   expectFewStripes(tiltedCube(), closeUp(8.0, surface));
+}
+
+/// A box of 16 voxels a side in which all values are 1.
+SparseVolume box() {
+  return sampled(0.0f, [](const Vec3& p) {
+    const auto isInside = [](double x) { return x >= 16.0 && x < 32.0; };
+    return isInside(p[0]) && isInside(p[1]) && isInside(p[2]) ? 1.0 : 0.0;
+  });
+}
+
+/// The level set of the same box.
+SparseVolume boxLevelSet() {
+  return sampled(3.0f, [](const Vec3& p) {
+    double away = -3.0;
+    for (const double x : p) away = std::max({away, 15.5 - x, x - 31.5});
+    return std::min(away, 3.0);
+  });
+}
+
+/// Seen from a direction in which samples lie at all distances from the faces.
+RenderOptions tilted(double voxels, const TransferFunction& transfer, const Vec3& from) {
+  RenderOptions o = closeUp(voxels, transfer);
+  o.camera.center = {23.5, 23.5, 23.5};
+  o.camera.eye = sum(o.camera.center, scaled(unit(from), 60.0));
+  o.minTransmittance = 0.0;
+  return o;
+}
+
+constexpr double kFine = 0.02;  // a step at which pictures no longer depend on the step
+
+/// The largest difference of a picture from that with short steps.
+double fromFine(const SparseVolume& volume, RenderOptions o) {
+  const Image drawn = renderVolume(volume, o);
+  o.step = kFine;
+  return largestDifference(drawn, renderVolume(volume, o));
+}
+
+/// A thin body, whose opacity is that of the distance through it, and a dense one.
+const std::array kBodies{OpacityCurve{{0.0, 0.0}, {1.0, 0.1}}, OpacityCurve{{0.0, 0.0}, {1.0, 0.9}},
+                         builtInOpacity("linear")};
+
+// The picture of a face that is parallel to the faces of voxels is constant for parallel rays.
+TEST(Classification, AFaceOfAConstantBodyHasNoStripes) {
+  for (const OpacityCurve& curve : kBodies)
+    for (const Vec3& from : {Vec3{1.0, 0.11, 0.17}, Vec3{0.12, 0.19, -1.0}}) {
+      const RenderOptions o = tilted(4.0, {builtInColorMap("viridis"), curve}, from);
+      EXPECT_LE(variance(renderVolume(box(), o), 1), 2e-5);
+      EXPECT_LE(fromFine(box(), o), 0.06);
+    }
+}
+
+TEST(Classification, AFaceThatIsClippedHasNoStripes) {
+  for (const OpacityCurve& curve : kBodies)
+    for (const Vec3& from : {Vec3{1.0, 0.11, 0.17}, Vec3{0.12, 0.19, -1.0}}) {
+      RenderOptions o = tilted(4.0, {builtInColorMap("viridis"), curve}, from);
+      o.clip = PlaceBox{{18.3, 18.3, 18.3}, {28.7, 28.7, 28.7}};
+      EXPECT_LE(fromFine(box(), o), 0.12);
+    }
+}
+
+/// The share of pixels that are covered with short steps and not with steps of a voxel, or the
+/// other way around.
+double frayed(const SparseVolume& volume, RenderOptions o) {
+  const Image drawn = renderVolume(volume, o);
+  o.step = kFine;
+  const Image fine = renderVolume(volume, o);
+  double count = 0.0;
+  for (std::size_t i = 3; i < fine.rgba.size(); i += 4)
+    count += std::abs(drawn.rgba[i] - fine.rgba[i]) > 0.5f ? 1.0 : 0.0;
+  return count / double(fine.rgba.size() / 4);
+}
+
+TEST(Classification, TheSilhouetteOfALevelSetIsThatOfShortSteps) {
+  const RenderOptions o = tilted(30.0, levelSetSurface(3.0), {1.0, 0.35, 0.6});
+  EXPECT_LE(frayed(boxLevelSet(), o), 0.0005);
+}
+
+TEST(Classification, TheSilhouetteOfAClipBoxIsThatOfShortSteps) {
+  RenderOptions o =
+      tilted(30.0, {builtInColorMap("viridis"), builtInOpacity("linear")}, {1.0, 0.35, 0.6});
+  o.clip = PlaceBox{{18.3, 18.3, 18.3}, {28.7, 28.7, 28.7}};
+  EXPECT_LE(frayed(box(), o), 0.005);
+}
+
+// The same silhouette with 16 rays a pixel: a pixel at the edge is covered in part, so that one ray
+// errs by at most a pixel, as many as the silhouette has, but not by more.
+TEST(Classification, TheSilhouetteOfALevelSetIsCloseToThatOfManyRays) {
+  RenderOptions o = tilted(30.0, levelSetSurface(3.0), {1.0, 0.35, 0.6});
+  const Image drawn = renderVolume(boxLevelSet(), o);
+  RenderOptions fine = o;
+  fine.step = kFine;
+  const Image oneRay = renderVolume(boxLevelSet(), fine);
+  o.resolution = {256, 256};
+  o.step = kFine;
+  const Image many = meansOfSquares(renderVolume(boxLevelSet(), o), 4);
+  EXPECT_GE(imagePsnr(drawn, many), imagePsnr(oneRay, many) - 0.3);
 }
 
 TEST(Classification, BothRulesAgreeAtShortSteps) {

@@ -14,6 +14,7 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <limits>
 #include <thread>
@@ -677,6 +678,61 @@ TEST_F(OtherVectors, OfMoreMemoryThanAllowedAreRefused) {
   EXPECT_NO_THROW((void)readComponent(path("in.vdb"), "wind", 0, {.maxBytes = kTwoComponents}));
   EXPECT_THROW((void)readVector(path("in.vdb"), "wind", {.maxBytes = kTwoComponents / 2}),
                MemoryExceeded);
+}
+
+// The directory of a file.
+
+openvdb::GridBase::Ptr oneVoxel(int number) {
+  const auto grid = FloatGrid::create();
+  grid->setName("g" + std::to_string(number));
+  grid->tree().setValue({number, 0, 0}, float(number + 1));
+  return grid;
+}
+
+openvdb::GridPtrVec manyGrids(int count) {
+  openvdb::GridPtrVec grids;
+  for (int n = 0; n < count; ++n) grids.push_back(oneVoxel(n));
+  return grids;
+}
+
+TEST_F(Voxels, ADirectoryFindsEachGrid) {
+  test::save(path(), manyGrids(5));
+  const ReadOptions options{.directory = inspectVdb(path()).directory};
+  ASSERT_NE(options.directory, nullptr);
+  for (std::size_t place = 0; place < 5; ++place) {
+    const VolumeGrid grid = readGrid(path(), place, options);
+    EXPECT_EQ(grid.descriptor.name, "g" + std::to_string(place));
+    EXPECT_EQ(activeRange(grid.volume).max, float(place + 1));
+  }
+}
+
+TEST_F(Voxels, TheDirectoryOfAnotherFileIsNotUsed) {
+  test::save(path(), manyGrids(5));
+  const ReadOptions options{.directory = inspectVdb(path()).directory};
+  std::filesystem::remove(path());
+  test::save(path(), {oneVoxel(7)});
+  EXPECT_EQ(readGrid(path(), 0, options).descriptor.name, "g7");
+  EXPECT_THROW((void)readGrid(path(), 4, options), BadInput);
+}
+
+// Reading all grids of a file takes time in proportion to their number, and not to its square. The
+// time of a read also has a part that depends on nothing, so that the ratio is below that of the numbers.
+TEST_F(Voxels, SlowTheTimeOfManyGridsIsProportionalToTheirNumber) {
+  const auto seconds = [&](int count) {
+    test::save(path(), manyGrids(count));
+    const ReadOptions options{.directory = inspectVdb(path()).directory};
+    double least = 1e9;
+    for (int repeat = 0; repeat < 3; ++repeat) {
+      const auto begin = std::chrono::steady_clock::now();
+      for (int place = 0; place < count; ++place)
+        (void)readGrid(path(), std::size_t(place), options);
+      const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+      least = std::min(least, took.count());
+    }
+    std::filesystem::remove(path());
+    return least;
+  };
+  EXPECT_LE(seconds(2000) / seconds(500), 8.0) << "16 if each read looks at all grids";
 }
 
 }  // namespace

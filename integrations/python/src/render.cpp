@@ -31,7 +31,19 @@ struct Look {
 struct Subject {
   Box box;
   LookBasis look;
+  VoxelShape voxel;
 };
+
+/// As esvr-render: an affine transform gives the voxels their shape; a frustum is not applied, and a
+/// warning says so.
+VoxelShape voxelOf(const GridDescriptor& grid) {
+  if (const auto shape = voxelShape(grid.transform.affine)) return *shape;
+  const std::string text =
+      "the transform of '" + grid.name +
+      "' is a frustum or has no inverse, and is not applied; voxels are drawn as cubes";
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  return {};
+}
 
 /// The function of esvr-render: the usual look unless something else is asked for.
 TransferFunction transferOf(const Look& look, const Subject& subject) {
@@ -53,7 +65,9 @@ RenderOptions optionsOf(const Look& look, const Subject& subject) {
   if (subject.box.empty()) throw UsageError("there is no active voxel to draw");
   RenderOptions options;
   options.resolution = look.resolution;
-  options.camera = fitCamera(subject.box, look.camera, look.resolution);
+  CameraWish wish = look.camera;
+  wish.voxel = subject.voxel;
+  options.camera = fitCamera(subject.box, wish, look.resolution);
   options.transfer = transferOf(look, subject);
   options.step = look.step;
   options.opacityLength = look.opacityLength;
@@ -98,14 +112,15 @@ py::array_t<std::uint8_t> drawn(const Look& look, const Subject& subject, const 
 
 py::array_t<std::uint8_t> drawVolume(const Volume& self, const Look& look) {
   const SparseVolume& volume = self.grid->volume;
-  return drawn(look, {activeBox(volume), lookBasis(self.grid->descriptor, volume)},
+  const GridDescriptor& grid = self.grid->descriptor;
+  return drawn(look, {activeBox(volume), lookBasis(grid, volume), voxelOf(grid)},
                [&](const Device& device) { return makeVolumeRenderer(volume, device); });
 }
 
 py::array_t<std::uint8_t> drawGrid(const Grid& self, const Look& look) {
   const StoredGrid& grid = *self.grid;
   if (!followsFromEllipsoids(grid)) return drawVolume(decoded(self, std::nullopt), look);
-  const Subject subject{grid.activeBox, lookBasis(grid, kNoMemoryLimit)};
+  const Subject subject{grid.activeBox, lookBasis(grid, kNoMemoryLimit), voxelOf(grid.descriptor)};
   return drawn(look, subject, [&](const Device& device) {
     return makeFieldRenderer(grid.field, device, {}, voxelRule(grid));
   });
@@ -113,10 +128,14 @@ py::array_t<std::uint8_t> drawGrid(const Grid& self, const Look& look) {
 
 constexpr const char* kRenderText =
     "Draws a picture: sRGB, uint8 of shape (height, width, 4).\n\n"
-    "eye, center and up are in index coordinates; what is not given is chosen so that the picture\n"
-    "shows everything. colors and opacity are names of esvr-render, whose usual opacity is taken "
-    "if\n"
-    "none is given; transfer is a ParaView preset.\n"
+    "The grid has its proportions in the world: eye, center and up are in the axes of the world,\n"
+    "from the place of voxel (0, 0, 0), in units of the shortest edge of a voxel, as for\n"
+    "esvr-render. For cubes along the axes these are index coordinates. A frustum is drawn in "
+    "index\n"
+    "coordinates, with a warning. What is not given is chosen so that the picture shows\n"
+    "everything. colors and opacity are names of esvr-render, whose usual opacity is taken if "
+    "none\n"
+    "is given; transfer is a ParaView preset.\n"
     "range has the values at the ends of the transfer function. Without a background (r, g, b), "
     "the\n"
     "alpha channel is the opacity, and colors are not premultiplied.";

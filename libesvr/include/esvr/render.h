@@ -214,6 +214,12 @@ class Renderer {
                                                            const Device& device,
                                                            const RendererLimits& limits = {});
 
+/// Whether the ellipsoids of a field have so much empty space between them that the table of blocks
+/// of voxels, by which rays find bricks, would be too large. On the CPU, makeFieldRenderer() does
+/// without this table; on a CUDA device, it throws UsageError.
+/// \param wanted  the voxels that are drawn
+[[nodiscard]] bool liesFarApart(const Field& field, const Box& wanted);
+
 /// A field that is drawn as in makeFieldRenderer with Between::kVoxels.
 struct DrawnField {
   const Field* field = nullptr;

@@ -18,6 +18,10 @@
 
 namespace esvr {
 
+namespace vdb {
+struct ArchiveDirectory;
+}
+
 // Reads and writes OpenVDB (.vdb) and NanoVDB (.nvdb) files. A reader recognises the format by the
 // file's first bytes; a writer chooses it by the extension.
 
@@ -45,6 +49,8 @@ struct VdbSummary {
   std::uint64_t fileBytes = 0;
   std::vector<MetaItem> metadata;  ///< file-level metadata, which includes `creator`
   std::vector<GridSummary> grids;  ///< grids in file order
+  /// Where the grids of a .vdb file are; see ReadOptions::directory.
+  std::shared_ptr<const vdb::ArchiveDirectory> directory{};
 };
 
 /// Lists a file's grids. It does not read their voxels if the format allows this.
@@ -70,6 +76,10 @@ struct ReadOptions {
   /// that it makes. A grid is refused before it is read if the memory has no room for their masks, or
   /// the disk none for their voxels in files.
   std::uint64_t volumes = 1;
+  /// VdbSummary::directory of the same file. Without it, each call looks at all grids of a file to find
+  /// one, which is slow for all grids of a file with thousands. If the file has changed since, it is
+  /// not used.
+  std::shared_ptr<const vdb::ArchiveDirectory> directory{};
 };
 
 /// A grid with its voxels.

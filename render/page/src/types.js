@@ -31,6 +31,8 @@
  *
  * @typedef {{low: number, high: number, counts: number[]}} Histogram
  *
+ * @typedef {[Triple, Triple, Triple]} Edges  of a voxel in the camera's space, as the library's VoxelShape
+ *
  * @typedef {object} Grid
  * @property {string} name
  * @property {"ellipsoids" | "voxels" | "vdb"} kind
@@ -42,6 +44,7 @@
  * @property {number} background
  * @property {[Triple, Triple]} box
  * @property {Triple | null} voxelSize
+ * @property {Edges | null} edges  null: a frustum, which is drawn as cubes
  * @property {[number, number]} range
  * @property {Histogram | null} histogram  null: ask for it
  * @property {Transfer} defaultLook

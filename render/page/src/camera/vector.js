@@ -22,6 +22,23 @@ export const lengthOf = (a) => Math.hypot(a[0], a[1], a[2]);
 /** @param {Triple} a @returns {Triple} */
 export const unitOf = (a) => times(a, 1 / lengthOf(a));
 
+/** Edges of a cube. @type {import("../types.js").Edges} */
+export const kCube = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
+/** A place or a direction of the index space in the camera's space. @param {import("../types.js").Edges | null} edges @param {Triple} v */
+export function placeOf(edges, v) {
+  const [a, b, c] = edges ?? kCube;
+  return plus(plus(times(a, v[0]), times(b, v[1])), times(c, v[2]));
+}
+/**
+ * The rows of the inverse: their inner products with a vector of the camera's space are its coordinates in
+ * the index space.
+ * @param {import("../types.js").Edges | null} edges @returns {import("../types.js").Edges}
+ */
+export function inverseOf(edges) {
+  const [a, b, c] = edges ?? kCube, volume = 1 / dot(a, cross(b, c));
+  return [times(cross(b, c), volume), times(cross(c, a), volume), times(cross(a, b), volume)];
+}
+
 /**
  * Turns a vector about an axis of length 1 (Rodrigues' formula).
  * @param {Triple} v @param {Triple} axis @param {number} angle  radians

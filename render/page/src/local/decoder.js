@@ -12,6 +12,7 @@
  *
  * @typedef {object} Tables  The tables of a transfer function; views of the module's memory.
  * @property {number} intervals @property {number} low @property {number} scale @property {number} weakGradientSquared
+ * @property {number} leastBend
  * @property {Float32Array} values @property {Float32Array | null} segments
  * @property {[number, number]} range @property {number} side  of the table of segments
  * @property {number[]} below @property {number[]} above @property {() => void} free
@@ -132,28 +133,29 @@ export class Decoder {
       const sampling = this.#putNumbers(take, [length, ...range, 0]);
       this.#words(sampling + 3 * kDoubleBytes, 1)[0] = side;
       const at = this.#orFail(this.#exports.page_make_tables(head, sampling));
-      const words = this.#words(at, 6), floats = [...new Float32Array(this.#memory, at, 14)];
-      const [intervals, , , , values, segments] = words;
+      const words = this.#words(at, 7), floats = [...new Float32Array(this.#memory, at, 15)];
+      const [intervals, , , , , values, segments] = words;
       return {
-        intervals, low: floats[1], scale: floats[2], weakGradientSquared: floats[3], range, side,
+        intervals, low: floats[1], scale: floats[2], weakGradientSquared: floats[3], leastBend: floats[4], range, side,
         values: new Float32Array(this.#memory, values, 4 * (intervals + 1)),
         segments: segments ? new Float32Array(this.#memory, segments, 4 * side * side) : null,
-        below: floats.slice(6, 10), above: floats.slice(10, 14), free: () => this.#exports.page_free_tables(at),
+        below: floats.slice(7, 11), above: floats.slice(11, 15), free: () => this.#exports.page_free_tables(at),
       };
     });
   }
 
   /**
    * @param {[Triple, Triple]} box
-   * @param {{direction: Triple | null, orthographic: boolean, width: number, height: number}} wish
+   * @param {{direction: Triple | null, orthographic: boolean, width: number, height: number, edges: import("../types.js").Edges | null}} wish
    * @returns {Camera}
    */
-  fit(box, { direction, orthographic, width, height }) {
+  fit(box, { direction, orthographic, width, height, edges }) {
     return this.#scoped((take) => {
       const corners = take(6 * kWordBytes), out = take(10 * kDoubleBytes);
       this.#words(corners, 6).set(box.flat());
       const from = direction ? this.#putNumbers(take, direction) : 0;
-      this.#exports.page_fit(corners, from, orthographic ? 1 : 0, width, height, out);
+      const voxel = edges ? this.#putNumbers(take, edges.flat()) : 0;
+      this.#exports.page_fit(corners, voxel, from, orthographic ? 1 : 0, width, height, out);
       const n = [...new Float64Array(this.#memory, out, 10)];
       const places = { eye: n.slice(0, 3), center: n.slice(3, 6), up: n.slice(6, 9) };
       return /** @type {any} */ ({ ...places, [orthographic ? "height" : "fov"]: n[9] });

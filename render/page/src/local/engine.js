@@ -107,7 +107,8 @@ export class Engine {
   /** @param {import("../types.js").FitRequest} request */
   fit({ grid, view, orthographic, width, height }) {
     const direction = kDirections[view] ?? null;
-    return this.#decoder.fit(this.#gridAt(grid).box, { direction, orthographic, width, height });
+    const { box, edges } = this.#gridAt(grid);
+    return this.#decoder.fit(box, { direction, orthographic, width, height, edges });
   }
 
   /** @param {import("../types.js").Place} place */
@@ -184,13 +185,13 @@ export class Engine {
   /** Makes the textures of a scene. @param {Scene} scene @param {Size} size @returns {Frame} */
   #prepare(scene, size) {
     this.#decoder.checkCamera(scene.camera, size);
-    const box = this.#gridAt(scene.grid).box;
-    const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, scaled(sum(...box), 0.5)) : 0;
+    const { box, edges } = this.#gridAt(scene.grid);
+    const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, scaled(sum(...box), 0.5), edges) : 0;
     this.#useVolume(scene.grid, fits(scene, wanted) ? wanted : 0);
     const { level, origin, bricks } = /** @type {Shape} */ (this.#atlas);
     this.#useTables(scene, level);
     const first = /** @type {Triple} */ (origin);
-    const view = viewOf(scene.camera, size, level, first);
+    const view = viewOf(scene.camera, size, level, first, edges);
     const clip = clipOf(scene)?.map((corner) => difference(placeInLevel(corner, level), first));
     const high = bricks.map((n) => 8 * n);
     return {

@@ -234,7 +234,10 @@ export class RayMarcher {
     number("uSegmentSide", tables.side);
     gl.uniform4fv(at("uBelow"), tables.below);
     gl.uniform4fv(at("uAbove"), tables.above);
+    number("uLeastBend", tables.leastBend);
     vector("uToLight", frame.toLight);
+    gl.uniformMatrix3fv(at("uEdges"), false, view.edges.flat());
+    gl.uniformMatrix3fv(at("uRows"), false, view.rows.flat());
     number("uWeakSquared", tables.weakGradientSquared * (place.scale / (this.#atlas?.scale ?? 1)) ** 2);
     gl.uniform4f(at("uBackground"), ...(frame.background ?? [0, 0, 0]), frame.background ? 1 : 0);
     ["uBricks", "uVoxels", "uValues", "uSegments"].forEach((name, unit) => gl.uniform1i(at(name), unit));

@@ -43,6 +43,7 @@ out vec4 color;
 const float kIntervals = 4096.0;
 const int kRow = ${kTableRow};
 const float kBrickSide = 8.0, kSlotSide = 9.0;
+const int kParts = 4;  // of a segment that is divided
 `;
 
 const kTransferTable = `
@@ -61,6 +62,17 @@ vec4 classified(float place) {
 
 /** Software renderers compute both sides of a branch, so that rare cases have shaders of their own. */
 const kSegmentInTable = `
+float absorbed(float t) {
+  return t < 1.0 / 64.0 ? t * (1.0 - t * (0.5 - t * (1.0 / 6.0))) : 1.0 - exp(-t);
+}
+
+// The light of a share of a segment, as if its values were those of the whole one.
+vec4 partOf(vec4 whole, float size) {
+  if (!(whole.a > 0.0)) return vec4(0.0);
+  float alpha = whole.a < 1.0 ? absorbed(-size * log(1.0 - whole.a)) : 1.0;
+  return whole * (alpha / whole.a);
+}
+
 // The light of a segment whose values lie in the table.
 vec4 segmentInTable(float a, float b) {
   vec2 share = (vec2(a, b) - uSegmentPlaces.x) / (uSegmentPlaces.y - uSegmentPlaces.x);
@@ -69,10 +81,6 @@ vec4 segmentInTable(float a, float b) {
 `;
 
 const kSegmentBeyondTable = `
-float absorbed(float t) {
-  return t < 1.0 / 64.0 ? t * (1.0 - t * (0.5 - t * (1.0 / 6.0))) : 1.0 - exp(-t);
-}
-
 // The light of a part of constant value.
 vec4 constantPart(vec4 means, float size) {
   if (!(means.a * size > 0.0)) return vec4(0.0);
@@ -80,13 +88,6 @@ vec4 constantPart(vec4 means, float size) {
   return vec4(means.rgb * (alpha / means.a), alpha);
 }
 vec4 beyond(float place) { return place < 0.0 ? uBelow : uAbove; }
-
-// The light of a share of a segment, as if its values were those of the whole one.
-vec4 partOf(vec4 whole, float size) {
-  if (!(whole.a > 0.0)) return vec4(0.0);
-  float alpha = whole.a < 1.0 ? absorbed(-size * log(1.0 - whole.a)) : 1.0;
-  return whole * (alpha / whole.a);
-}
 
 // The light of the segment from a sample to the next. Values beyond the ends of the table have
 // constant colors.
@@ -105,18 +106,20 @@ vec4 segment(float a, float b) {
 
 const kShading = `
 uniform vec3 uToLight;
+uniform mat3 uEdges, uRows;  // from directions of the index space, and from gradients there, to the camera's space
 uniform float uWeakSquared;  // in places of the table
 const float kAmbient = 0.3, kDiffuse = 0.7, kSpecular = 0.25, kShininess = 25.0;
 
 float voxelAt(vec3 local, vec3 slot) { return textureLod(uVoxels, (local + slot) * uTexel, 0.0).r; }
 
-// Factor of the color, and the highlight.
+// Factor of the color, and the highlight. The direction is that of the ray in the camera's space.
 vec2 shadeAt(vec3 local, vec3 slot, vec3 direction) {
   vec3 low = max(local - 0.5, 0.0), high = min(local + 0.5, kBrickSide);
   vec3 g = uPlaceScale / (high - low) * vec3(
     voxelAt(vec3(high.x, local.yz), slot) - voxelAt(vec3(low.x, local.yz), slot),
     voxelAt(vec3(local.x, high.y, local.z), slot) - voxelAt(vec3(local.x, low.y, local.z), slot),
     voxelAt(vec3(local.xy, high.z), slot) - voxelAt(vec3(local.xy, low.z), slot));
+  g = uRows * g;
   float squared = dot(g, g);
   if (!(squared > 0.0)) return vec2(kAmbient + kDiffuse, 0.0);
   float perLength = inversesqrt(squared);
@@ -132,49 +135,67 @@ vec4 lit(vec4 c, vec2 shade) { return vec4(c.rgb * shade.x + shade.y * c.a, c.a)
 
 /**
  * The state of a ray, and what each mode does with the samples in bricks. A sample whose share is 0 is
- * empty space; so are those between the bricks, before which leave() is called.
+ * empty space; so are those between the bricks, which are skipped. add() adds a part of a segment, by its
+ * number (RayParts), and returns the number of the next one.
  */
 const kModes = {
   maximum: `
 float largest;
 bool seen = false;
-void add(float share, float place) {
-  if (share == 0.0) return;
-  largest = seen ? max(largest, place) : place;
-  seen = true;
+int add(int part, float share, float place) {
+  if (share != 0.0) {
+    largest = seen ? max(largest, place) : place;
+    seen = true;
+  }
+  return part + kParts;
 }
-void leave() {}
 vec4 result() { return seen ? classified(largest) : vec4(0.0); }
 `,
   average: `
 float total = 0.0, count = 0.0;
-void add(float share, float place) {
-  if (share == 0.0) return;
-  total += place;
-  ++count;
+int add(int part, float share, float place) {
+  if (share != 0.0) {
+    total += place;
+    ++count;
+  }
+  return part + kParts;
 }
-void leave() {}
 vec4 result() { return count > 0.0 ? classified(total / count) : vec4(0.0); }
 `,
   post: `
-void add(float share, float place) {
+int add(int part, float share, float place) {
   if (share != 0.0) absorb(LIT(classified(place), nowShade));
+  return part + kParts;
 }
-void leave() {}
 vec4 result() { return vec4(light, 1.0 - transmittance); }
 `,
   pre: `
-float lastShare = 0.0, lastPlace;
-void add(float share, float place) {
+float lastShare = 0.0, lastPlace, change = 0.0;
+bool divided = false;
+uniform float uLeastBend;  // in places of the table
+
+bool bends(float from, float place) {
+  float bend = abs(place - from - (lastShare != 0.0 ? change : 0.0));
+  return bend * transmittance > uLeastBend && min(from, place) - bend < kIntervals &&
+         max(from, place) + bend > 0.0;
+}
+int add(int part, float share, float place) {
   // Nothing is drawn between two samples in empty space.
   if (share != 0.0 || lastShare != 0.0) {
     float from = lastShare != 0.0 ? lastPlace : uPlaceOfBackground;
-    absorb(LIT(SEGMENT(from, place), share != 0.0 ? nowShade : lastShade));
+    if (!divided && bends(from, place)) {
+      divided = true;
+      return part - kParts + 1;
+    }
+    vec4 whole = SEGMENT(from, place);
+    absorb(LIT((divided ? partOf(whole, 1.0 / float(kParts)) : whole), (share != 0.0 ? nowShade : lastShade)));
+    change = (place - from) * (divided ? float(kParts) : 1.0);
   }
   lastShare = share;
   lastPlace = place;
+  divided = divided && part % kParts != 0;
+  return part + (divided ? 1 : kParts);
 }
-void leave() { add(0.0, uPlaceOfBackground); }
 vec4 result() { return vec4(light, 1.0 - transmittance); }
 `,
 };
@@ -204,47 +225,56 @@ int samplesToLeave(vec3 p, vec3 perVoxel, vec3 low, vec3 high) {
   return int(clamp(ceil(min(ahead.x, min(ahead.y, ahead.z)) - 1e-3), 1.0, 1e9));
 }
 
+float sampleOf(int part) { return float(part - kParts) / float(kParts); }
+
 void main() {
   vec2 pixel = vec2(gl_FragCoord.x, uHeight - gl_FragCoord.y);
   float x = uLeft + pixel.x * uPixel.x, y = uTop - pixel.y * uPixel.y;
   vec3 across = uRight * x + uUp * y;
   vec3 origin = uPerspective ? uEye : uEye + across;
-  vec3 direction = uPerspective ? normalize(uForward + across) : uForward;
+  // Of length 1 in the camera's space, where the axes of the picture have this length.
+  vec3 direction = uPerspective ? (uForward + across) / sqrt(1.0 + x * x + y * y) : uForward;
   vec2 range = within(origin, direction);
   float first = ceil(range.x / uStep), final = floor(range.y / uStep);
   vec3 start = origin + direction * (first * uStep), apart = direction * uStep;
   vec3 perVoxel = mix(1.0 / apart, vec3(0.0), lessThan(abs(apart), vec3(1e-30)));
-  int count = first <= final ? int(final - first) + 1 : 0;
+  // The sample behind the last one ends the last segment.
+  int lastPart = range.x < range.y ? (int(final - first) + 2) * kParts : 0;
+  int firstInside = int(ceil((range.x / uStep - first + 1.0) * float(kParts)));
+  int lastInside = int(floor((range.y / uStep - first + 1.0) * float(kParts)));
   ivec3 last = textureSize(uBricks, 0) - 1;
-  int i = 0;
-  while (i < count && OPEN) {
+  int part = kParts;
+  BEGIN
+  while (part <= lastPart && OPEN) {
     vec3 p, low;
     uvec4 entry;
-    bool skipped = false;
     // Software renderers run all of a loop's body for every pixel, so that this loop is a short one.
-    for (; i < count; skipped = true) {
-      p = start + float(i) * apart;
+    while (true) {
+      p = start + sampleOf(part) * apart;
       // Rounding can move a place beyond the box.
       ivec3 brick = clamp(ivec3(floor(p / kBrickSide)), ivec3(0), last);
       low = vec3(brick) * kBrickSide;
       entry = texelFetch(uBricks, brick, 0);
-      if (entry.a == 0u) break;
+      if (entry.a == 0u || !SKIPS) break;
       float room = (float(entry.a) - 1.0) * kBrickSide;
-      i += samplesToLeave(p, perVoxel, low - room, low + kBrickSide + room);
+      part += kParts * samplesToLeave(p, perVoxel, low - room, low + kBrickSide + room);
+      if (part > lastPart) break;
     }
-    if (skipped) leave();
-    if (i >= count) break;
+    if (part > lastPart) break;
     vec3 slot = vec3(entry.xyz) * kSlotSide + 0.5;
     vec3 texel = (start - low + slot) * uTexel, texelsApart = apart * uTexel;
-    int end = min(count, i + samplesToLeave(p, perVoxel, low, low + kBrickSide));
-    for (; i < end && OPEN; ++i) {
-      float share = textureLod(uVoxels, texel + float(i) * texelsApart, 0.0).r;
+    // The parts of this brick. A ray that divides a segment may go back to the brick before.
+    int begin = part, end = begin + samplesToLeave(p, perVoxel * float(kParts), low, low + kBrickSide);
+    bool isEmpty = entry.a != 0u;
+    end = isEmpty ? begin + 1 : min(end, lastPart + 1);
+    while (part >= begin && part < end && OPEN) {
+      bool isInside = !isEmpty && part >= firstInside && part <= lastInside;
+      float share = isInside ? textureLod(uVoxels, texel + sampleOf(part) * texelsApart, 0.0).r : 0.0;
       SHADE
-      add(share, share * uPlaceScale + uPlaceOfBackground);
+      part = add(part, share, share * uPlaceScale + uPlaceOfBackground);
       NEXT_SHADE
     }
   }
-  leave();
   color = result();
   color += (1.0 - color.a) * uBackground;
 }`;
@@ -255,6 +285,7 @@ void main() {
  */
 export function fragmentShader({ mode, classification, shade, inTable }) {
   const composite = mode === "composite", isLit = composite && shade;
+  const isDivided = composite && classification === "pre";
   const parts = [
     "#version 300 es",
     kDeclarations,
@@ -265,8 +296,10 @@ export function fragmentShader({ mode, classification, shade, inTable }) {
     isLit ? kShading + "vec2 nowShade, lastShade;" : "",
     `#define LIT(light, shade) ${isLit ? "lit(light, shade)" : "light"}`,
     `#define OPEN ${composite ? "!(transmittance < uMinTransmittance)" : "true"}`,
-    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(start + float(i) * apart - low, 0.0, kBrickSide), slot, direction);" : ""}`,
-    `#define NEXT_SHADE ${isLit ? "lastShade = nowShade;" : ""}`,
+    `#define BEGIN ${isDivided ? "if (first > final) divided = true, part = 1;" : ""}`,
+    `#define SKIPS ${isDivided ? "(lastShare == 0.0 && !divided)" : "true"}`,
+    `#define SHADE ${isLit ? "nowShade = shadeAt(clamp(start + sampleOf(part) * apart - low, 0.0, kBrickSide), slot, uEdges * direction);" : ""}`,
+    `#define NEXT_SHADE ${isLit ? "lastShade = isInside ? nowShade : lastShade;" : ""}`,
     composite ? kComposite : "",
     kModes[composite ? classification : mode],
     kMarch,

@@ -19,6 +19,7 @@ export function StatisticsPanel({ description, scene, grid, speed }) {
     ["Bytes of the file", bytesText(description.files[scene.file].bytes)],
     ["Active voxels", countText(grid.activeVoxels)],
     ["Size in voxels", sizeText(grid)],
+    ["Transform", grid.edges === null && "a frustum, which is not applied; voxels are drawn as cubes"],
     ["Class", grid.class],
     ["Values", `${grid.range.map((v) => shortText(v)).join(" to ")}${grid.unit && " " + grid.unit}`],
     ["Pictures per second while moving", speed?.fps && shortText(speed.fps, 3)],

@@ -70,12 +70,13 @@ function Handle({ box, limits, side, axis, project, onChange }) {
  * @param {object} props
  * @param {import("../types.js").Camera} props.camera
  * @param {{width: number, height: number}} props.size
+ * @param {import("../types.js").Edges | null} props.edges  of a voxel
  * @param {Box} props.clip
  * @param {Box} props.limits
  * @param {(clip: Box, moving: boolean) => void} props.onChange
  */
-export function ClipHandles({ camera, size, clip, limits, onChange }) {
-  const project = projectionOf(camera, size);
+export function ClipHandles({ camera, size, edges, clip, limits, onChange }) {
+  const project = projectionOf(camera, size, edges);
   const corners = Array.from({ length: 8 }, (_, i) => project(cornerOf(clip, i)));
   return (
     <svg class="overlay" width={size.width} height={size.height} role="group" aria-label="Clip box">

@@ -52,7 +52,7 @@ export function Picture({ scene, grid, size, area, canvases, onChange, onFit, bu
       )}
       {scene.clip && size.width > 0 && (
         <ClipHandles
-          camera={scene.camera} size={size} clip={scene.clip} limits={edgesOf(grid)}
+          camera={scene.camera} size={size} edges={grid.edges} clip={scene.clip} limits={edgesOf(grid)}
           onChange={(clip, moving) => onChange({ clip }, moving)}
         />
       )}
