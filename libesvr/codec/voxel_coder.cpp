@@ -925,7 +925,7 @@ class VoxelCoder {
   std::vector<std::uint8_t>& isCopy_;
   std::uint8_t vacantClass_;
   const Thrift* thrift_;
-  double owed_ = 0.0;  ///< sum of the errors of the brick so far, in steps
+  double owed_ = 0.0;              ///< sum of the errors of the brick so far, in steps
   std::size_t partBricks_ = 0;     ///< bricks of this part of the stream that are no copies
   std::uint32_t lastSource_ = 0;   ///< source of the latest brick that was a copy
   std::uint32_t lastVacancy_ = 0;  ///< vacancy of the latest brick that has one

@@ -35,6 +35,8 @@ double boxGain(const SparseVolume& volume, const std::optional<Box>& given) {
   return 10.0 * std::log10(std::max(share, 1.0));
 }
 
+bool isToned(const Job& job) { return job.judge && job.judge->tone().isOn(); }
+
 bool seesPictures(const Job& job) { return job.judge && job.judge->seesPictures(); }
 
 double psnrOf(const Job& job, SparseVolume volume) {
@@ -220,11 +222,11 @@ EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
       saturates_(saturates(job.input.source)),
-      rounding_(seesPictures(job) ? kTuning.seenRounding : kTuning.rounding),
+      rounding_(isToned(job) ? kTuning.tonedRounding : kTuning.rounding),
       margin_(compact_ ? compactMargin(rounding_.usualLoss * rounding_.factor) : kFloat32Margin),
-      behind_(seesPictures(job) ? kTuning.seenShortFitBehind
-              : saturates_      ? kTuning.shortFitBehindSaturated
-                                : kTuning.shortFitBehind),
+      behind_(isToned(job) ? kTuning.tonedShortFitBehind
+              : saturates_ ? kTuning.shortFitBehindSaturated
+                           : kTuning.shortFitBehind),
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);

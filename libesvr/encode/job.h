@@ -40,6 +40,9 @@ template <class Work>
 /// are at these.
 [[nodiscard]] double boxGain(const SparseVolume& volume, const std::optional<Box>& box);
 
+/// True if the input of the job has the tones of a curve.
+[[nodiscard]] bool isToned(const Job& job);
+
 /// True if the quality of the job is what is seen.
 [[nodiscard]] bool seesPictures(const Job& job);
 
