@@ -401,6 +401,9 @@ TEST_F(CompareCheck, refusesABaselineThatChecksNothing) {
     bad["bytes"] = value;
     expectRefused(bad, "bytes is no object");
   }
+  auto empty = good;
+  empty["grids"]["density"] = json::object();
+  expectRefused(empty, "has no figures");
   auto misspelt = good;
   misspelt["grids"]["density"]["max_eror"] = good["grids"]["density"]["max_error"];
   expectRefused(misspelt, "which is no figure");
