@@ -239,8 +239,7 @@ Goal goalOf(const Arguments& a, const Options& options) {
   requireGridGoals(a, options);
   if (options.maxError) return boundGoal(a, options);
   if (options.picturePsnr) {
-    refuseWith(a, "picture-psnr",
-               {"psnr", "count", "seconds", "iterations", "size", "ratio", "paper"});
+    refuseWith(a, "picture-psnr", {"psnr", "seconds", "size", "ratio", "paper"});
     return PictureGoal{*options.picturePsnr};
   }
   if (options.psnr && !options.convert.fit.seconds && !options.paper)

@@ -149,6 +149,7 @@ std::uint64_t bytesOfRecord(const StoredGrid& grid) {
   record.descriptor = grid.descriptor;
   record.field.chunks.resize(std::min<std::size_t>(grid.field.chunks.size(), 1));
   record.activeThreshold = grid.activeThreshold;
+  record.tone = grid.tone;
   record.activeBox = grid.activeBox;
   record.activeVoxels = grid.activeVoxels;
   record.valueMin = grid.valueMin, record.valueMax = grid.valueMax;

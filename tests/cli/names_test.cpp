@@ -240,7 +240,7 @@ class VectorConversion : public test::FolderTest {
 };
 
 TEST_F(VectorConversion, RestoresAllPropertiesOfTheGrid) {
-  convertThereAndBack({"--preset", "draft"});
+  convertThereAndBack({"--preset", "draft", "--measure", "values"});
   ASSERT_EQ(readEsvr(out()).vectors, (std::vector<StoredVector>{{"velocity", 0}}));
   const auto run = check({"--fail-on", "all", "--min-psnr", "30"});
   EXPECT_EQ(run.exitCode, 0) << run.out << run.err;
@@ -318,7 +318,7 @@ TEST_F(VectorConversion, OfDoublesIsCarriedInALosslessFileAndFittedOtherwise) {
   const auto run = test::vdb2esvr({in(), out(), "--lossless"});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("its values are doubles"));
-  convertThereAndBack({"--preset", "draft"});
+  convertThereAndBack({"--preset", "draft", "--measure", "values"});
   EXPECT_EQ(readEsvr(out()).vectors.size(), 1u);
   EXPECT_TRUE(openvdb::gridPtrCast<openvdb::Vec3DGrid>(written()));
 }

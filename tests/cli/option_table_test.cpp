@@ -51,10 +51,12 @@ Table vdb2esvrTests() {
           {"--max-error", "Vdb2Esvr.keepsEveryVoxelWithinTheBound"},
           {"--max-memory", "Vdb2Esvr.refusesWhatTakesMoreMemoryThanAllowed"},
           {"--max-vram", "Vdb2EsvrOption.maxVramBoundsTheDevicesMemoryOnGpu"},
+          {"--measure", "Vdb2EsvrOption.measureSaysWhatAPresetMeans"},
           {"--missing", "SequenceFiles.mayBeHeldOrSkippedWhereTheyAreMissing"},
           {"--nonfinite", "Vdb2Esvr.takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany"},
           {"--on-error", "SequenceFiles.stopAfterADamagedOneWhereAsked"},
           {"--paper", "Vdb2Esvr.reportsWhatThePapersMethodUsed"},
+          {"--picture-psnr", "Vdb2EsvrOption.picturePsnrIsReached"},
           {"--preset", "Vdb2EsvrOption.presetsTakeMoreAndMoreIterations"},
           {"--progress", "Parts.areReportedAsJson"},
           {"--psnr", "Vdb2EsvrOption.psnrIsReached"},
@@ -70,6 +72,7 @@ Table vdb2esvrTests() {
           {"--skip", "CarriedFile.LeavesOutTheGridsThatAreNamedBySkip"},
           {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
           {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
+          {"--tone", "Vdb2EsvrOption.toneIsStored"},
           {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"}};
 }
 

@@ -69,6 +69,31 @@ TEST_F(Vdb2EsvrOption, effortLengthensTheFit) {
   EXPECT_LT(iterations("5"), iterations("7"));
 }
 
+TEST_F(Vdb2EsvrOption, picturePsnrIsReached) {
+  const Json coarse = quick({"--picture-psnr", "25"}), fine = quick({"--picture-psnr", "40"});
+  EXPECT_EQ(fine["measured"], "pictures");
+  EXPECT_GE(coarse["quality"]["psnr_t50"].get<double>(), 25.0);
+  EXPECT_GE(fine["quality"]["psnr_t50"].get<double>(), 40.0);
+  EXPECT_LT(coarse["bytes"].get<int>(), fine["bytes"].get<int>());
+}
+
+TEST_F(Vdb2EsvrOption, measureSaysWhatAPresetMeans) {
+  const auto measured = [&](const char* measure) -> Json {
+    return convert({"--measure", measure, "--representation", "ellipsoids"})["grids"][0];
+  };
+  const Json seen = measured("auto"), values = measured("values");
+  EXPECT_EQ(seen["measured"], "pictures");
+  EXPECT_EQ(values["measured"], "values");
+  EXPECT_GE(seen["quality"]["psnr_t50"].get<double>(), 38.0);
+  EXPECT_GE(values["metrics"]["psnr_active"].get<double>(), 40.0);
+}
+
+TEST_F(Vdb2EsvrOption, toneIsStored) {
+  EXPECT_EQ(quick({"--tone", "0.125"})["tone"].get<float>(), 0.125f);
+  EXPECT_EQ(readEsvr(at("out.esvr")).grids[0].tone.scale, 0.125f);
+  EXPECT_TRUE(quick({"--tone", "off"})["tone"].is_null());
+}
+
 TEST_F(Vdb2EsvrOption, ratioBoundsTheFile) {
   const std::uintmax_t bytes = sizeOf("in.vdb");
   for (const char* ratio : {"4", "8"}) {

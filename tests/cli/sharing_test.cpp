@@ -45,8 +45,9 @@ class SharingGrids : public testing::Test {
   }
 
   test::ProgramRun run(Arguments options) const {
-    options.insert(options.begin(), {in(), out(), "--device", "cpu", "--force", "--representation",
-                                     "voxels", "--report", folder_ / "r.json"});
+    options.insert(options.begin(),
+                   {in(), out(), "--device", "cpu", "--force", "--representation", "voxels",
+                    "--measure", "values", "--report", folder_ / "r.json"});
     return test::vdb2esvr(options);
   }
   /// \return the report
@@ -120,8 +121,8 @@ TEST_F(SharingGrids, takeFewerBytesInTheFramesOfAFile) {
                      {{.name = "density", .voxels = softBall({frame, 0, 0})},
                       {.name = "heat", .voxels = softBall({frame, 0, 0}, 40.0f)}});
   const Arguments command{
-      folder_ / "in.####.vdb", out(),    "--frames", "1-3",    "--device", "cpu",
-      "--representation",      "voxels", "--force",  "--share"};
+      folder_ / "in.####.vdb", out(),    "--frames", "1-3",       "--device", "cpu",
+      "--representation",      "voxels", "--force",  "--measure", "values",   "--share"};
   std::vector<std::uint64_t> bytes;
   for (const char* share : {"off", "auto"}) {
     Arguments arguments = command;
