@@ -355,12 +355,17 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) const {
     if ((over >= 0.0 && over <= kPsnrSpare) || attempt.cancelled()) break;
     search.learn(psnr);
   }
+  if (bestOver < 0.0 && !attempt.cancelled()) best->fit.end = FitEnd::kPsnrMissed;
   return std::move(*best);
 }
 
 /// The quality that an attempt has after rounding.
 double EllipsoidSearch::qualityOf(const Attempt& attempt, const CompactResult& rounded) const {
-  return job_.judge ? psnrOf(job_, rounded.grid) : attempt.psnr - rounded.loss;
+  const auto judged = unlessCancelled([&]() -> std::optional<double> {
+    if (!job_.judge) return std::nullopt;
+    return psnrOf(job_, rounded.grid);
+  });
+  return judged.value_or(attempt.psnr - rounding_.factor * rounded.loss);
 }
 
 // ---- Short fits

@@ -150,6 +150,7 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
   if (grid.voxels && grid.voxels->form != VoxelForm::kQuantised) return;
   grid.tone = tone;
   if (grid.activeThreshold > 0.0f) grid.activeThreshold = tone.value(grid.activeThreshold);
+  const BestSoFar completion;  // a grid that is there is not given up
   for (std::size_t k = 0; k + 1 < grid.layerErrors.size(); ++k) {
     const VolumeMetrics m = compareVolumes(input.source, decodeGrid(firstLayers(grid, k + 1)));
     grid.layerErrors[k] = {float(m.psnrBox), float(m.maxError)};
