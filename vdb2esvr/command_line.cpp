@@ -155,7 +155,7 @@ void addFitOptions(cli::po::options_description& options) {
     ("seconds", value<double>()->value_name("S"), "end the fit of each grid after this time")
     ("iterations", value<std::int64_t>()->value_name("N"), "number of iterations of a fit")
     ("preset", value<std::string>()->value_name("P")->default_value("standard"),
-     "quality without another target: draft, standard or high stand for a PSNR of 30, 38 or 46 dB of the "
+     "quality without another target: draft, standard or high stand for a PSNR of 30, 38 or 48 dB of the "
      "transmittance of fog volumes, and of 32, 40 or 50 dB over the active voxels of other grids; in a single fit, the count and the iterations that are not given")
     ("effort", value<std::int64_t>()->value_name("E")->default_value(std::int64_t(kUsualEffort)),
      "time to take, from 1 (shortest) to 9 (longest)")

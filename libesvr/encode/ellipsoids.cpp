@@ -185,8 +185,8 @@ constexpr double kGrownFrom = 0.9;
 /// one is that near.
 constexpr double kNear = 1.3;
 constexpr int kMostDrafts = 3;
-/// Largest number of ellipsoids of the first of them, which scouts.
-constexpr double kMostOfFirstDraft = 6000.0;
+/// Largest number of ellipsoids of the first of them, and of one that scouts before them.
+constexpr double kMostOfFirstDraft = 6000.0, kMostOfScout = 2000.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
 constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
@@ -217,7 +217,7 @@ double countFor(const Attempt& from, double psnr, double slope) {
 
 EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
     : options_(job.options),
-      job_{job.input, options_, job.judge, job.firstFit},
+      job_{job.input, options_, job.judge},
       goal_(goal),
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
@@ -253,7 +253,6 @@ FitOptions optionsFor(const Job& job, double count, std::uint32_t iterations) {
 Attempt attempted(const Job& job, const FitOptions& options) {
   Attempt result;
   result.asked = *options.count;
-  result.bothSigns = options.bothSigns;
   result.fit = fit(job.input.source, options);
   result.grid = storedGridOf(job, result.fit);
   const auto psnr = unlessCancelled([&]() -> std::optional<double> {
@@ -265,7 +264,7 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   return result;
 }
 
-/// The number of ellipsoids of the first short fit for a size, and for a PSNR, of which the first fit scouts.
+/// The number of ellipsoids of the first short fit for a size, and for a PSNR.
 double firstCount(const Job& job) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
     return kGrownFrom * double(size->bytes) / kTuning.usualBytesEach;
@@ -275,16 +274,13 @@ double firstCount(const Job& job) {
 
 }  // namespace
 
-Attempt shortFitOf(const Job& job) {
-  return attempted(job, optionsFor(job, firstCount(job), planOf(job).shortIterations));
+Attempt scoutingFit(const Job& job) {
+  const double count = std::min(firstCount(job), kMostOfScout);
+  return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
 }
 
 Attempt EllipsoidSearch::shortFit(double count) const {
-  const FitOptions options = optionsFor(job_, count, plan_.shortIterations);
-  const Attempt* first = job_.firstFit;
-  const bool isMade = first && !first->cancelled() && first->asked == *options.count &&
-                      options.bothSigns == first->bothSigns;
-  return isMade ? *first : attempted(job_, options);
+  return attempted(job_, optionsFor(job_, count, plan_.shortIterations));
 }
 
 /// The attempt whose number of ellipsoids is nearest to a number and from which a fit can continue;

@@ -13,18 +13,17 @@ namespace esvr::encode {
 
 /// A fit, and its grid in float32.
 struct Attempt {
-  FitResult fit;                    ///< its field was moved to the grid
-  StoredGrid grid;                  ///< grid in float32
-  double psnr = 0.0;                ///< quality, dB
-  std::size_t asked = 0;            ///< wanted number of ellipsoids; the grid may have fewer
-  std::optional<bool> bothSigns{};  ///< FitOptions::bothSigns
+  FitResult fit;          ///< its field was moved to the grid
+  StoredGrid grid;        ///< grid in float32
+  double psnr = 0.0;      ///< quality, dB
+  std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
 
   [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
   [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
 };
 
-/// The first short fit of a search for a PSNR or a size.
-[[nodiscard]] Attempt shortFitOf(const Job& job);
+/// A short fit of few ellipsoids, which shows what suits a job.
+[[nodiscard]] Attempt scoutingFit(const Job& job);
 
 /// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
 /// are found by value, and the end of the fit becomes kCancelled.

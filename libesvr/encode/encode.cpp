@@ -295,7 +295,7 @@ class Converter {
     ConvertOptions options = job_.options;
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
-    const Job job{job_.input, options, job_.judge, job_.firstFit};
+    const Job job{job_.input, options, job_.judge};
     const double psnr =
         Judge::seesPictures({job.input.descriptor, valuesOf(job)}, options)
             ? presetPicturePsnr(options.fit.preset)
@@ -514,9 +514,7 @@ Conversion convertNear(const ConvertInput& given, const ConvertOptions& options,
 }
 
 /// Converts a volume that is judged by pictures, or by the values of its tones.
-Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
-                         const ToneChoice& choice) {
-  const ToneCurve tone = choice.tone;
+Conversion convertJudged(const ConvertInput& given, ConvertOptions options, ToneCurve tone) {
   const Judge judge(given, options, tone);
   GridDescriptor descriptor = given.descriptor;
   SparseVolume tones;
@@ -536,7 +534,7 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
       size->bytes -= std::min<std::uint64_t>(size->bytes, sizeof tone.scale);
   }
   const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
-  const Job job{input, options, &judge, choice.fit ? &*choice.fit : nullptr};
+  const Job job{input, options, &judge};
   Conversion conversion = std::visit(Converter(job), options.goal);
   conversion.smallerExactBytes =
       unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
@@ -565,9 +563,8 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
   };
   if (std::holds_alternative<PictureGoal>(own.goal) && !Judge::seesPictures(input, own))
     own.goal = PresetGoal{};
-  const ToneChoice choice = chooseTone(input, own);
-  if (choice.tone.isOn() || Judge::seesPictures(input, own))
-    return convertJudged(input, own, choice);
+  const ToneCurve tone = chooseTone(input, own);
+  if (tone.isOn() || Judge::seesPictures(input, own)) return convertJudged(input, own, tone);
   const Job job{input, own};
   Conversion conversion = own.fit.narrowBand ? convertNarrowBand(job, convertTo) : convertTo(job);
   conversion.smallerExactBytes =
@@ -613,7 +610,7 @@ double presetPicturePsnr(Preset preset) {
     case Preset::kDraft:
       return 30.0;
     case Preset::kHigh:
-      return 46.0;
+      return 48.0;
     case Preset::kStandard:
       break;
   }

@@ -11,14 +11,12 @@
 namespace esvr::encode {
 
 class Judge;
-struct Attempt;
 
 /// The input and the options of a conversion, which a job does not own.
 struct Job {
   const ConvertInput& input;  ///< has the tones of the values if there is a tone curve
   const ConvertOptions& options;
-  const Judge* judge = nullptr;       ///< null: quality is the PSNR over the box
-  const Attempt* firstFit = nullptr;  ///< a short fit that a search need not repeat; null: none
+  const Judge* judge = nullptr;  ///< null: quality is the PSNR over the box
 };
 
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.

@@ -25,6 +25,9 @@ bool leavesTheMeasure(const Goal& goal) {
   return std::holds_alternative<PresetGoal>(goal) || std::holds_alternative<SizeGoal>(goal);
 }
 
+/// dB by which the PSNR of a preset's pictures is lower than that of its values.
+constexpr double kPicturesBelowValues = 2.0;
+
 }  // namespace
 
 bool Judge::seesPictures(const ConvertInput& input, const ConvertOptions& options) {
@@ -45,7 +48,8 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
   if (!seesPictures(input, options)) return;
   pictures_.emplace(input.source, options.fit.box);
   if (leavesTheMeasure(options.goal))
-    valueGain_ = kTuning.picturesAboveValues - boxGain(input.source, options.fit.box);
+    valueGain_ = (tone.isOn() ? kTuning.picturesAboveValues : -kPicturesBelowValues) -
+                 boxGain(input.source, options.fit.box);
 }
 
 /// Turns tones into values, as a reader of the grid does.
@@ -105,42 +109,30 @@ ToneCurve likelyTone(const SparseVolume& volume) {
   return {float(std::sqrt(median * quartile))};
 }
 
-/// A short fit with a curve, and its quality for the comparison of curves.
-struct ToneTrial {
-  Attempt fit;
-  double quality = 0.0;
-};
-
-ToneTrial tried(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options) {
+/// The quality of a short fit with a curve, for the comparison of curves.
+double qualityWith(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options) {
   const Judge judge(input, options, tone);
   const SparseVolume tones = tone.isOn() ? tonesOf(input.source, tone) : SparseVolume{};
   const ConvertInput toned{input.descriptor, tone.isOn() ? tones : input.source};
-  ToneTrial trial{shortFitOf({toned, options, &judge})};
-  trial.quality = judge.forTones(decodeGrid(trial.fit.grid));
-  return trial;
+  return judge.forTones(decodeGrid(scoutingFit({toned, options, &judge}).grid));
 }
 
 }  // namespace
 
-ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options) {
+ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options) {
   const bool isBounded = std::holds_alternative<BoundGoal>(options.goal) ||
                          std::holds_alternative<LosslessGoal>(options.goal);
   if (isBounded || input.source.background != 0.0f) return {};
-  if (options.tone) return {*options.tone};
+  if (options.tone) return *options.tone;
   if (const StoredGrid* previous = options.previous; previous && previous->voxels)
-    return {previous->tone};
+    return previous->tone;
   if (!Judge::seesPictures(input, options)) return {};
   const ToneCurve likely = likelyTone(input.source);
   if (!likely.isOn()) return {};
-  std::optional<ToneTrial> with, without;
-  (void)unlessCancelled([&] {
-    with = tried(likely, input, options);
-    without = tried({}, input, options);
-    return true;
+  const auto gain = unlessCancelled([&] {
+    return std::optional(qualityWith(likely, input, options) - qualityWith({}, input, options));
   });
-  if (!without) return {};
-  if (with->quality < without->quality + kTuning.toneGain) return {{}, std::move(without->fit)};
-  return {likely, std::move(with->fit)};
+  return gain && *gain > kTuning.toneGain ? likely : ToneCurve{};
 }
 
 void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {

@@ -3,7 +3,6 @@
 
 #include <optional>
 
-#include "encode/ellipsoids.h"
 #include "encode/job.h"
 #include "esvr/tone.h"
 #include "metrics/transmittance.h"
@@ -41,19 +40,15 @@ class Judge {
   ValueRange range_;
   bool halfs_;
   CompareOptions box_;
-  /// dB that are added to the PSNR over the box, which then is a second limit of the quality; nothing: it
-  /// is none.
+  /// dB that are added to the PSNR over the box, which then is a second limit of the quality; nothing: it is
+  /// none.
   std::optional<double> valueGain_;
   std::optional<metrics::TransmittanceReference> pictures_;
 };
 
 /// The tone curve of a conversion: that of the options, that of the previous frame, or the one with which
 /// a short fit is better than without, where the values call for one.
-struct ToneChoice {
-  ToneCurve tone{};
-  std::optional<Attempt> fit{};  ///< the short fit that was compared
-};
-[[nodiscard]] ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options);
+[[nodiscard]] ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options);
 
 /// The tones of a volume.
 [[nodiscard]] SparseVolume tonesOf(const SparseVolume& volume, ToneCurve tone);

@@ -63,7 +63,8 @@ struct Tuning {
 
   // ---- What is seen
 
-  /// dB by which the PSNR over the active voxels may be lower than that of the transmittance.
+  /// dB by which the PSNR over the active voxels may be lower than that of the transmittance, where a tone curve
+  /// is used. Cycles shows smoke1 with 34 dB over the active voxels at 41 to 43 dB (docs/convert.md).
   double picturesAboveValues = 4.0;
   /// The ninth decile of the active values relative to their median from which on a tone curve is tried, and
   /// the dB by which it must be better.

@@ -14,6 +14,7 @@
 #include "core/add_seconds.h"
 #include "core/parallel.h"
 #include "encode/root_search.h"
+#include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "format/section_table.h"
@@ -223,7 +224,7 @@ VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setti
   const StoredGrid* previous = job_.options.previous;
   ThriftOptions thrift{setting.price, previous && previous->voxels ? &*previous->voxels : nullptr,
                        job_.options.keepsPastErrors ? kTuning.errorsKept : 0.0, voxelSigns(job_),
-                       seesPictures(job_) ? kTuning.massPrice : 0.0};
+                       isToned(job_) ? kTuning.massPrice : 0.0};
   if (tooMany) {
     const double left = double(*goal_.bytes - std::min(*goal_.bytes, besides_));
     thrift.mostBytes =

@@ -76,8 +76,8 @@ using Goal =
 /// What the quality of a PresetGoal and of a SizeGoal means.
 enum class Measure {
   /// What is seen of a volume that is looked through (isLookedThrough, metrics.h; background 0): the PSNR
-  /// of its transmittance for T = 0.5, unless the PSNR over the active voxels is more than 4 dB below. For
-  /// any other volume, as kValues.
+  /// of its transmittance for T = 0.5, unless the PSNR over the active voxels limits it: it may be 4 dB
+  /// lower with a tone curve, and must be 2 dB higher without one. For any other volume, as kValues.
   kAuto,
   kValues  ///< the PSNR of values
 };
