@@ -121,7 +121,7 @@ struct Thrift {
   std::vector<double> exact;           ///< the voxels in units of the lattice, as the layer's codes
   double bitPrice = 0.0;               ///< squared error, in the same units, that a bit is worth
   RoundedSigns signs = RoundedSigns::kMayChange;  ///< kKept: a code keeps its sign
-  double massPrice = 0.0;  ///< ThriftOptions::massPrice
+  double massPrice = 0.0;                         ///< ThriftOptions::massPrice
 };
 
 /// What was coded before a limit stopped the coder.
