@@ -114,7 +114,8 @@ double qualityWith(ToneCurve tone, const ConvertInput& input, const ConvertOptio
   const Judge judge(input, options, tone);
   const SparseVolume tones = tone.isOn() ? tonesOf(input.source, tone) : SparseVolume{};
   const ConvertInput toned{input.descriptor, tone.isOn() ? tones : input.source};
-  return judge.forTones(decodeGrid(scoutingFit({toned, options, &judge}).grid));
+  const Attempt made = scoutingFit({toned, options, &judge});
+  return judge.forTones(decodeGrid(made.grid, {.memory = memoryOf(input.source)}));
 }
 
 }  // namespace
@@ -142,14 +143,14 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
   if (grid.voxels && grid.voxels->form != VoxelForm::kQuantised) return;
   grid.tone = tone;
   if (grid.activeThreshold > 0.0f) grid.activeThreshold = tone.value(grid.activeThreshold);
-  const BestSoFar completion;  // a grid that is there is not given up
-  for (std::size_t k = 0; k + 1 < grid.layerErrors.size(); ++k) {
-    const VolumeMetrics m = compareVolumes(input.source, decodeGrid(firstLayers(grid, k + 1)));
-    grid.layerErrors[k] = {float(m.psnrBox), float(m.maxError)};
+  const BestSoFar completion;      // a grid that is there is not given up
+  std::vector<LayerError> errors;  // of the values; those of the grid are of its tones
+  for (std::size_t layers = 1; layers <= grid.layerErrors.size(); ++layers) {
+    const VolumeMetrics m = compareVolumes(
+        input.source, decodeGrid(firstLayers(grid, layers), {.memory = memoryOf(input.source)}));
+    errors.push_back({float(m.psnrBox), float(m.maxError)});
   }
-  if (grid.layerErrors.empty()) return;
-  const VolumeMetrics m = compareVolumes(input.source, decodeGrid(grid));
-  grid.layerErrors.back() = {float(m.psnrBox), float(m.maxError)};
+  grid.layerErrors = std::move(errors);
 }
 
 }  // namespace esvr::encode
