@@ -296,10 +296,9 @@ class Converter {
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
     const Job job{job_.input, options, job_.judge};
-    const double psnr =
-        Judge::seesPictures({job.input.descriptor, valuesOf(job)}, options)
-            ? presetPicturePsnr(options.fit.preset)
-            : presetPsnr(options.fit.preset) + boxGain(job.input.source, options.fit.box);
+    const double psnr = seesPictures(job) ? presetPicturePsnr(options.fit.preset)
+                                          : presetPsnr(options.fit.preset) +
+                                                boxGain(job.input.source, options.fit.box);
     return Choice(job, {.psnr = psnr}).forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
   }
   Conversion operator()(const SizeGoal& goal) const {
@@ -539,7 +538,7 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options, Tone
   conversion.smallerExactBytes =
       unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
   if (tone.isOn()) setTone(given, tone, conversion.grid);
-  conversion.byPictures = Judge::seesPictures(given, options);
+  conversion.byPictures = judge.seesPictures();
   conversion.grid = throughTheFormat(std::move(conversion.grid), previous, memoryOf(given.source));
   return conversion;
 }

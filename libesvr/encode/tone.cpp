@@ -145,7 +145,7 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
   grid.tone = tone;
   if (grid.activeThreshold > 0.0f) grid.activeThreshold = tone.value(grid.activeThreshold);
   const BestSoFar completion;      // a grid that is there is not given up
-  std::vector<LayerError> errors;  // of the values; those of the grid are of its tones
+  std::vector<LayerError> errors;  // The grid has the errors of its tones so far.
   for (std::size_t layers = 1; layers <= grid.layerErrors.size(); ++layers) {
     const VolumeMetrics m = compareVolumes(
         input.source, decodeGrid(firstLayers(grid, layers), {.memory = memoryOf(input.source)}));
