@@ -133,6 +133,9 @@ void addGoalOptions(cli::po::options_description& options) {
     ("max-error", value<std::string>()->value_name("E"),
      "keep the error of every voxel within E, or within E% of the range of the active values (of vectors: of the component with the largest range); NAME=E is the "
      "bound of one grid, as with --psnr; voxels are stored")
+    ("max-relative-error", value<std::string>()->value_name("E[,F]"),
+     "keep the error of every voxel within the share E of its magnitude, such as 1%, or of the magnitude F "
+     "where it is smaller (default: the smallest one above 0); voxels are stored")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("measure", value<std::string>()->value_name("M")->default_value("auto"),

@@ -77,6 +77,24 @@ void readMaxError(const std::string& text, Options& options) {
   }
 }
 
+/// Reads --max-relative-error, such as "1%" or "1%,0.001".
+RelativeBoundGoal relativeBoundIn(const std::string& text) {
+  const std::string option = "max-relative-error";
+  const auto parts = cli::splitText(text, ',');
+  const auto refuse = [&] {
+    return UsageError("--" + option +
+                      " must be a share below 100% and, after a comma, a magnitude above 0, " +
+                      "such as 1% or 1%,0.001, not '" + text + "'");
+  };
+  if (parts.size() > 2) throw refuse();
+  RelativeBoundGoal goal{cli::parseErrorBound(option, parts[0]).amount};
+  if (!(goal.share < 1.0)) throw refuse();
+  if (parts.size() == 1) return goal;
+  goal.floor = cli::parseNumber(parts[1]);
+  if (!goal.floor || !(*goal.floor > 0.0) || !std::isfinite(float(*goal.floor))) throw refuse();
+  return goal;
+}
+
 /// Reads the values of --psnr and --max-error, such as "40" or "40,density=50": the value without a
 /// name is that of all grids that are not named.
 void readGridGoals(const cli::Arguments& a, Options& options) {
@@ -204,18 +222,19 @@ std::optional<ToneCurve> toneCurve(const Arguments& a) {
   const bool isScale = scale && std::isfinite(float(*scale)) && float(*scale) > 0.0f;
   if (!isScale)
     throw UsageError("--tone must be auto, off or a scale above 0 such as 0.1, not '" + text + "'");
-  refuseWith(a, "tone S", {"lossless", "max-error", "paper"});
+  refuseWith(a, "tone S", {"lossless", "max-error", "max-relative-error", "paper"});
   return ToneCurve{float(*scale)};
 }
 
 Goal losslessGoal(const Arguments& a) {
   refuseWith(a, "lossless",
-             {"max-error", "count", "psnr", "picture-psnr", "seconds", "size", "ratio", "paper"});
+             {"max-error", "max-relative-error", "count", "psnr", "picture-psnr", "seconds", "size",
+              "ratio", "paper"});
   return LosslessGoal{};
 }
 
 Goal boundGoal(const Arguments& a, const Options& options) {
-  refuseWith(a, "max-error", {"count", "seconds", "size", "ratio", "paper"});
+  refuseWith(a, "max-error", {"max-relative-error", "count", "seconds", "size", "ratio", "paper"});
   if (options.psnr) throw UsageError("--max-error cannot be combined with --psnr");
   refuseWith(a, "max-error", {"picture-psnr"});
   return *options.maxError;
@@ -238,6 +257,11 @@ Goal goalOf(const Arguments& a, const Options& options) {
   if (a.get<bool>("lossless")) return losslessGoal(a);
   requireGridGoals(a, options);
   if (options.maxError) return boundGoal(a, options);
+  if (const auto text = a.find<std::string>("max-relative-error")) {
+    refuseWith(a, "max-relative-error",
+               {"picture-psnr", "psnr", "count", "seconds", "size", "ratio", "paper"});
+    return relativeBoundIn(*text);
+  }
   if (options.picturePsnr) {
     refuseWith(a, "picture-psnr", {"psnr", "seconds", "size", "ratio", "paper"});
     return PictureGoal{*options.picturePsnr};

@@ -68,6 +68,17 @@ bool isShare(const Goal& goal) {
   return within && within->relative;
 }
 
+/// The wanted bound relative to each value, and the magnitude below which it does not fall.
+Json maxRelativeErrorOf(const Goal& goal) {
+  const auto* within = std::get_if<RelativeBoundGoal>(&goal);
+  return within ? Json(within->share) : Json(nullptr);
+}
+
+Json relativeFloorOf(const Goal& goal) {
+  const auto* within = std::get_if<RelativeBoundGoal>(&goal);
+  return within ? orNull(within->floor) : Json(nullptr);
+}
+
 /// The goals of single grids.
 Json goalsOf(const std::vector<GridGoal>& goals) {
   Json list = Json::array();
@@ -79,6 +90,12 @@ Json goalsOf(const std::vector<GridGoal>& goals) {
                     {"max_error_is_share", isShare(own.goal)}});
   }
   return list;
+}
+
+/// By what the goal of a grid was measured.
+const char* measureOf(const Conversion& conversion) {
+  if (conversion.surfaceBound) return "surface";
+  return conversion.byPictures ? "pictures" : "values";
 }
 
 /// The tone curve that was asked for.
@@ -102,6 +119,8 @@ Json askedJson(const Options& options) {
           {"lossless", std::holds_alternative<LosslessGoal>(options.convert.goal)},
           {"max_error", maxErrorOf(options.convert.goal)},
           {"max_error_is_share", isShare(options.convert.goal)},
+          {"max_relative_error", maxRelativeErrorOf(options.convert.goal)},
+          {"relative_floor", relativeFloorOf(options.convert.goal)},
           {"representation", nameOf(options.convert.representation)},
           {"goals", goalsOf(options.gridGoals)},
           {"share", options.shares ? "auto" : "off"},
@@ -339,7 +358,8 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"ellipsoids", grid.stored().field.ellipsoidCount()},
           {"bytes", cli::ownBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},
-          {"measured", grid.conversion.byPictures ? "pictures" : "values"},
+          {"measured", measureOf(grid.conversion)},
+          {"surface_bound", orNull(grid.conversion.surfaceBound)},
           {"tone", grid.stored().tone.isOn() ? Json(grid.stored().tone.scale) : Json(nullptr)},
           {"kernel", kernelOf(grid.stored().field.kernel)},
           {"topology", topologyOf(record, g)},

@@ -62,7 +62,7 @@ void printRemark(const ConvertedGrid& grid, std::ostream& out) {
 
 /// Says how far the surface of a level set has moved, or why the grid is stored like other grids.
 void printSurface(const ConvertedGrid& grid, std::ostream& out) {
-  if (!grid.whyNoNarrowBand.empty())
+  if (!grid.whyNoNarrowBand.empty() && !grid.conversion.surfaceBound)
     out << cli::printable(grid.uniqueName)
         << ": this level set is stored like other grids, because " << grid.whyNoNarrowBand << '\n';
   if (!grid.surface || !grid.surface->distance) return;
@@ -83,8 +83,11 @@ void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostr
   out << '\n';
 }
 
-/// Says that the goal was measured by what is seen, and which tone curve serves it.
+/// Says that the goal was measured by what is seen, and which tone curve serves it, or by the surface.
 void printMeasure(const ConvertedGrid& grid, std::ostream& out) {
+  if (const auto bound = grid.conversion.surfaceBound)
+    out << cli::printable(grid.uniqueName) << ": judged by its surface; every value is within "
+        << cli::shortNumber(*bound) << ", and no voxel changes its side\n";
   const ToneCurve tone = grid.stored().tone;
   if (!grid.conversion.byPictures && !tone.isOn()) return;
   out << cli::printable(grid.uniqueName) << ": ";

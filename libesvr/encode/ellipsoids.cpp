@@ -109,7 +109,9 @@ CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResul
   target.device = fit.chunks > 1 ? Device{} : wanted.device;
   auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
     if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return compactGrid(grid, job.input.source, target);
+    CompactResult made = compactGrid(grid, job.input.source, target);
+    keepMass(job, made.grid);
+    return made;
   });
   if (found) return std::move(*found);
   const BestSoFar completion;

@@ -315,9 +315,18 @@ class Converter {
   Conversion operator()(const BoundGoal& goal) const {
     const SparseVolume& source = job_.input.source;
     const double bound = absoluteBound(goal, source);
-    return asVoxels(bound == 0.0 ? exactLayer(source)
-                                 : boundedLayer(source, bound, voxelActivity(job_),
-                                                voxelSigns(job_), decodedValues(job_)));
+    if (bound == 0.0) return asVoxels(exactLayer(source));
+    return orExact(asVoxels(
+        boundedLayer(source, bound, voxelActivity(job_), voxelSigns(job_), decodedValues(job_))));
+  }
+  Conversion operator()(const RelativeBoundGoal& goal) const {
+    if (!(goal.share > 0.0 && goal.share < 1.0) ||
+        (goal.floor && !(*goal.floor > 0.0 && std::isfinite(float(*goal.floor)))))
+      throw UsageError("a relative bound is a share between 0 and 1 of magnitudes above 0");
+    RelativeLayer made = relativeLayer(job_, goal);
+    Conversion conversion = asVoxels(std::move(made.layer));
+    if (made.tone.isOn()) setTone(job_.input, made.tone, conversion.grid);
+    return orExact(std::move(conversion));
   }
   Conversion operator()(const LosslessGoal&) const {
     if (job_.input.descriptor.valueType == ValueType::kDouble)
@@ -336,6 +345,12 @@ class Converter {
     Conversion conversion;
     conversion.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(layer));
     return conversion;
+  }
+
+  /// Voxels within a bound, or exact ones where these are no larger.
+  [[nodiscard]] Conversion orExact(Conversion bounded) const {
+    if (auto exact = smallerExactVoxels(job_, bounded.grid)) bounded.grid = std::move(exact->grid);
+    return bounded;
   }
 
   Job job_;
@@ -372,11 +387,18 @@ void requireBound(const ConvertInput& input, const SparseVolume& decoded, double
 void requirePromises(const Job& job, const StoredGrid& grid) {
   const SparseVolume& source = job.input.source;
   const auto bound = boundOf(job.options.goal, source);
-  if (!bound && !job.options.fit.narrowBand) return;
+  const auto* relative = std::get_if<RelativeBoundGoal>(&job.options.goal);
+  if (!bound && !relative && !job.options.fit.narrowBand) return;
   const BestSoFar completion;  // no grid is returned that was not checked
   const SparseVolume decoded = decodeGrid(grid, {.memory = memoryOf(source)});
   if (bound) requireBound(job.input, decoded, *bound);
+  if (relative) requireRelativeBound(job.input, decoded, *relative);
   if (job.options.fit.narrowBand) requireSigns(job.input, decoded);
+}
+
+/// True if the errors of a goal have a bound.
+bool isBounded(const Goal& goal) {
+  return std::holds_alternative<BoundGoal>(goal) || std::holds_alternative<RelativeBoundGoal>(goal);
 }
 
 void requirePossible(const ConvertOptions& options) {
@@ -387,7 +409,7 @@ void requirePossible(const ConvertOptions& options) {
     throw UsageError("float32 storage is a form of ellipsoids; it excludes voxels");
   const bool wantsEllipsoids =
       wanted == Representation::kEllipsoids || options.storage.form == Storage::kFloat32;
-  if (wantsEllipsoids && std::holds_alternative<BoundGoal>(options.goal))
+  if (wantsEllipsoids && isBounded(options.goal))
     throw UsageError(
         "ellipsoids do not bound the error of every voxel; store voxels, or choose a PSNR or a "
         "size");
@@ -512,6 +534,36 @@ Conversion convertNear(const ConvertInput& given, const ConvertOptions& options,
   return conversion;
 }
 
+/// Whether a level set is judged by its surface. A narrow band is not: its values are distances to the surface
+/// of a few voxels, so that their PSNR says the same.
+bool isJudgedBySurface(const ConvertInput& input, const ConvertOptions& options) {
+  const bool isOpen = options.measure == Measure::kAuto &&
+                      options.representation != Representation::kEllipsoids &&
+                      options.storage.form == Storage::kCompact;
+  return isOpen && input.descriptor.gridClass == GridClass::kLevelSet && !options.fit.narrowBand &&
+         (std::holds_alternative<PresetGoal>(options.goal) ||
+          std::holds_alternative<SizeGoal>(options.goal));
+}
+
+/// Converts a level set that is judged by its surface to voxels.
+/// \return nothing if it has no surface, or if no voxels fit into the size
+std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptions options) try {
+  const auto change = changeAcrossSurface(input.source);
+  if (!change) return std::nullopt;
+  std::optional<double> bound;
+  if (std::holds_alternative<PresetGoal>(options.goal)) {
+    bound = presetSurfaceBound(options.fit.preset) * *change;
+    options.goal = BoundGoal{*bound};
+  }
+  options.representation = Representation::kVoxels;
+  options.measure = Measure::kValues;
+  Conversion conversion = convertVolume(input, options);
+  conversion.surfaceBound = bound;
+  return conversion;
+} catch (const UsageError&) {
+  return std::nullopt;
+}
+
 /// Converts a volume that is judged by pictures, or by the values of its tones.
 Conversion convertJudged(const ConvertInput& given, ConvertOptions options, ToneCurve tone) {
   const Judge judge(given, options, tone);
@@ -538,6 +590,7 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options, Tone
   conversion.smallerExactBytes =
       unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
   if (tone.isOn()) setTone(given, tone, conversion.grid);
+  measureLayers(given, conversion.grid);
   conversion.byPictures = judge.seesPictures();
   conversion.grid = throughTheFormat(std::move(conversion.grid), previous, memoryOf(given.source));
   return conversion;
@@ -555,6 +608,8 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
   if (own.previous && own.previous->farBackground) own.previous = nullptr;
   own.fit.cancel = CancelScope::token();
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
+  if (isJudgedBySurface(input, own))
+    if (auto made = convertSurface(input, own)) return std::move(*made);
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
   own.representation = possibleRepresentation(input, own);
   const auto convertTo = [](const Job& job) {
@@ -626,6 +681,18 @@ double presetPsnr(Preset preset) {
       break;
   }
   return 40.0;
+}
+
+double presetSurfaceBound(Preset preset) {
+  switch (preset) {
+    case Preset::kDraft:
+      return 0.4;
+    case Preset::kHigh:
+      return 0.025;
+    case Preset::kStandard:
+      break;
+  }
+  return 0.1;
 }
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {

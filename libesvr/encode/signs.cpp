@@ -220,7 +220,38 @@ bool voxelsAreSmaller(const Job& job, const Conversion& made) {
          made.choice->voxels->bytes <= bytesAdded(made.grid);
 }
 
+/// A voxel in a brick or in one of the next ones along the axes, if it is active.
+std::optional<float> activeValueAt(const SparseVolume& volume, std::size_t brick, Coord local) {
+  const Coord step{local.x / kBrickSide, local.y / kBrickSide, local.z / kBrickSide};
+  if (step != Coord{}) {
+    const auto next = findBrick(volume, volume.bricks[brick] + step);
+    if (!next) return std::nullopt;
+    brick = *next;
+    local = local - Coord{kBrickSide * step.x, kBrickSide * step.y, kBrickSide * step.z};
+  }
+  const int voxel = voxelOffset(local);
+  if (!volume.active[brick].test(voxel)) return std::nullopt;
+  return volume.brickValues(brick)[std::size_t(voxel)];
+}
+
 }  // namespace
+
+std::optional<double> changeAcrossSurface(const SparseVolume& volume) {
+  constexpr std::array kSteps{Coord{1, 0, 0}, Coord{0, 1, 0}, Coord{0, 0, 1}};
+  std::vector<double> changes;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (!volume.active[b].test(v)) continue;
+      const float value = volume.brickValues(b)[std::size_t(v)];
+      for (const Coord step : kSteps)
+        if (const auto next = activeValueAt(volume, b, voxelLocal(v) + step))
+          if ((value < 0.0f) != (*next < 0.0f)) changes.push_back(std::abs(double(*next) - value));
+    }
+  if (changes.empty()) return std::nullopt;
+  const auto middle = changes.begin() + std::ptrdiff_t(changes.size() / 2);
+  std::nth_element(changes.begin(), middle, changes.end());
+  return *middle;
+}
 
 Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))

@@ -1,7 +1,9 @@
 #pragma once
-/// Conversions of narrow bands, which keep the sign of every voxel.
+/// The surfaces of level sets: conversions of narrow bands, which keep the sign of every voxel, and what a
+/// value of any other level set means as a distance.
 
 #include <functional>
+#include <optional>
 
 #include "encode/job.h"
 
@@ -17,6 +19,12 @@ using ConvertTo = std::function<Conversion(const Job&)>;
 /// \throws UsageError  ellipsoids and their residual do not fit into the size
 /// Other exceptions are those of `convertTo`.
 [[nodiscard]] Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo);
+
+/// The usual difference of two neighbours of which one is inside the surface and one is not: about the change of
+/// the values by one voxel across it. It is the median over all such pairs of active voxels, so that
+/// markers of empty space do not count.
+/// \return nothing if there is no such pair, and no surface
+[[nodiscard]] std::optional<double> changeAcrossSurface(const SparseVolume& volume);
 
 /// Checks that a decoded narrow band has the signs of its source, in its bricks and elsewhere.
 /// \throws RuntimeFailure  a sign differs; the text names the grid and the voxel

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
 #include "encode/tuning.h"
+#include "encode/voxels.h"
 #include "esvr/encode.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -76,6 +78,49 @@ double Judge::forTones(SparseVolume volume) const {
   return 0.5 * (seen.psnr50 + seen.psnr10);
 }
 
+// ---- The total mass
+
+double Judge::massOf(SparseVolume tones) const {
+  toValues(tones);
+  std::vector<double> parts(tones.brickCount());
+  parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
+    for (const float value : tones.brickValues(b)) parts[b] += value;
+  });
+  return std::accumulate(parts.begin(), parts.end(), 0.0);
+}
+
+double Judge::massFactor(const SparseVolume& reference, const SparseVolume& decoded) const {
+  // The derivative of the mass by the factor: that of a value is u dv/du = u cosh(u / s).
+  std::vector<double> parts(decoded.brickCount());
+  const double s = tone_.scale;
+  parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
+    for (const float u : decoded.brickValues(b))
+      parts[b] += tone_.isOn() ? u * std::cosh(u / s) : u;
+  });
+  const double growth = std::accumulate(parts.begin(), parts.end(), 0.0);
+  const double missing = massOf(reference) - massOf(decoded);
+  // A larger factor would change what is seen more than the missing mass does.
+  constexpr double kMostChange = 0.05;
+  if (!(std::abs(missing) <= kMostChange * growth)) return 1.0;
+  return 1.0 + missing / growth;
+}
+
+void keepMass(const Job& job, StoredGrid& grid) {
+  constexpr int kSteps = 2;  // clamps and rounding are not in the derivative
+  constexpr double kEnough = 1e-4;
+  if (!seesPictures(job) || grid.quantised.empty()) return;
+  for (int n = 0; n < kSteps; ++n) {
+    const double factor = job.judge->massFactor(
+        job.input.source, decodeGrid(grid, {.memory = memoryOf(job.input.source)}));
+    if (std::abs(factor - 1.0) < kEnough) return;
+    for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
+      grid.quantised[c].lattice.intensityStep *= factor;
+      grid.field.chunks[c].ellipsoids = dequantise(grid.quantised[c]);
+    }
+    grid.activeThreshold = float(grid.activeThreshold * factor);
+  }
+}
+
 // ---- The tone curve
 
 SparseVolume tonesOf(const SparseVolume& volume, ToneCurve tone) {
@@ -123,6 +168,7 @@ double qualityWith(ToneCurve tone, const ConvertInput& input, const ConvertOptio
 
 ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options) {
   const bool isBounded = std::holds_alternative<BoundGoal>(options.goal) ||
+                         std::holds_alternative<RelativeBoundGoal>(options.goal) ||
                          std::holds_alternative<LosslessGoal>(options.goal);
   if (isBounded || input.source.background != 0.0f) return {};
   if (options.tone) return *options.tone;
@@ -144,14 +190,123 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
   if (grid.voxels && grid.voxels->form != VoxelForm::kQuantised) return;
   grid.tone = tone;
   if (grid.activeThreshold > 0.0f) grid.activeThreshold = tone.value(grid.activeThreshold);
-  const BestSoFar completion;      // a grid that is there is not given up
-  std::vector<LayerError> errors;  // The grid has the errors of its tones so far.
+}
+
+void measureLayers(const ConvertInput& input, StoredGrid& grid) {
+  const BestSoFar completion;  // a grid that is there is not given up
+  std::vector<LayerError> errors;
   for (std::size_t layers = 1; layers <= grid.layerErrors.size(); ++layers) {
     const VolumeMetrics m = compareVolumes(
         input.source, decodeGrid(firstLayers(grid, layers), {.memory = memoryOf(input.source)}));
     errors.push_back({float(m.psnrBox), float(m.maxError)});
   }
   grid.layerErrors = std::move(errors);
+}
+
+// ---- A bound relative to each value
+
+namespace {
+
+struct Magnitudes {
+  double least = std::numeric_limits<double>::infinity();        ///< of all active values
+  double leastAbove0 = std::numeric_limits<double>::infinity();  ///< infinite if all are 0
+};
+
+Magnitudes magnitudesOf(const SparseVolume& volume) {
+  Magnitudes found;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (!volume.active[b].test(v)) continue;
+      const double magnitude = std::abs(double(volume.brickValues(b)[std::size_t(v)]));
+      found.least = std::min(found.least, magnitude);
+      if (magnitude > 0.0) found.leastAbove0 = std::min(found.leastAbove0, magnitude);
+    }
+  return found;
+}
+
+/// The shares within which the values of a lattice should be, so that they keep to a bound after they are rounded
+/// to what a reader gets: the first usually does, and the others are safer.
+std::vector<double> sharesBeforeRounding(double share, double floor, DecodedValues decoded) {
+  if (decoded == DecodedValues::kFloats) return {share - 0x1p-23};
+  // The source's values are halfs, m times as large as the distance u of halfs around them. A value
+  // within (floor(share m) + 1/2) u is rounded to a half within the bound, unless it lies beyond a
+  // power of 2, where halfs are farther apart.
+  constexpr double kLeastApart = 0x1p-24, kFirst = 1024.0, kLast = 2048.0;
+  double before = share;
+  for (double m = std::clamp(std::floor(floor / kLeastApart), 1.0, kFirst); m <= kLast; m += 1.0)
+    before = std::min(before, (std::floor(share * m) + 0.5) / m);
+  return {before, share - 0x1p-10};
+}
+
+/// A voxel that is not within a bound relative to its value.
+std::optional<Coord> beyondRelativeBound(const SparseVolume& source, const SparseVolume& decoded,
+                                         double share, double floor) {
+  for (std::size_t b = 0; b < source.brickCount(); ++b) {
+    const auto other = findBrick(decoded, brickOf(source.brickCorner(b) - decoded.origin));
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const double value = source.brickValues(b)[std::size_t(v)];
+      const double made = other ? decoded.brickValues(*other)[std::size_t(v)] : decoded.background;
+      if (made == value || std::abs(made - value) <= share * std::max(std::abs(value), floor))
+        continue;
+      return source.brickCorner(b) + voxelLocal(v);
+    }
+  }
+  return std::nullopt;
+}
+
+/// What a reader gets from a layer of tones. \param range  of the source's active values
+SparseVolume decodedTones(const VoxelLayer& layer, ToneCurve tone, const ValueRange& range,
+                          DecodedValues decoded) {
+  SparseVolume volume = volumeOf(layer);
+  for (float& value : volume.values) value = std::clamp(tone.value(value), range.min, range.max);
+  if (decoded == DecodedValues::kHalfs) roundToHalfs(volume);
+  return volume;
+}
+
+}  // namespace
+
+RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal) {
+  const SparseVolume& source = job.input.source;
+  const Magnitudes magnitudes = magnitudesOf(source);
+  if (!std::isfinite(magnitudes.leastAbove0)) return {exactLayer(source), {}};
+  double floor = goal.floor.value_or(magnitudes.leastAbove0);
+  if (source.background != 0.0f)
+    return {boundedLayer(source, goal.share * std::max(floor, magnitudes.least), voxelActivity(job),
+                         voxelSigns(job), decodedValues(job)),
+            {}};
+  // Frames of a sequence are predicted from each other where they have one curve.
+  const StoredGrid* previous = job.options.previous;
+  if (previous && previous->tone.isOn() && double(previous->tone.scale) <= floor)
+    floor = previous->tone.scale;
+  ToneCurve tone{float(floor)};
+  if (double(tone.scale) > floor) tone.scale = std::nextafter(tone.scale, 0.0f);
+  floor = tone.scale;
+  if (!(floor > 0.0)) return {exactLayer(source), {}};
+  // A step of u moves a value by step sqrt(v^2 + floor^2), which is the largest share of
+  // max(v, floor) at the floor. There, the half step takes it to floor (1 + share).
+  const SparseVolume tones = tonesOf(source, tone);
+  const ValueRange range = activeRange(tones);
+  const double rounded = double(std::max(-range.min, range.max)) * 0x1p-23;
+  ValueRange values = activeRange(source);
+  values.expand(source.background);
+  for (const double share : sharesBeforeRounding(goal.share, floor, decodedValues(job))) {
+    const double halfStep = floor * (std::asinh(1.0 + share) - std::asinh(1.0)) - rounded;
+    if (!(halfStep > rounded)) continue;
+    VoxelLayer layer = boundedLayer(tones, halfStep, voxelActivity(job), voxelSigns(job));
+    if (layer.form != VoxelForm::kQuantised) break;
+    const auto decoded = decodedTones(layer, tone, values, decodedValues(job));
+    if (!beyondRelativeBound(source, decoded, goal.share, floor)) return {std::move(layer), tone};
+  }
+  return {exactLayer(source), {}};
+}
+
+void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded,
+                          const RelativeBoundGoal& goal) {
+  const double floor = goal.floor.value_or(magnitudesOf(input.source).leastAbove0);
+  const auto beyond = beyondRelativeBound(input.source, decoded, goal.share, floor);
+  if (beyond)
+    throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': the error at " +
+                         toString(*beyond) + " exceeds the bound relative to the value there");
 }
 
 }  // namespace esvr::encode

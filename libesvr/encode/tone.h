@@ -29,11 +29,16 @@ class Judge {
   /// better for thin and for dense smoke.
   [[nodiscard]] double forTones(SparseVolume volume) const;
 
+  /// The factor of decoded tones with which the total mass of their values is that of a reference.
+  /// \param reference  tones of the source, or of a sample of it
+  [[nodiscard]] double massFactor(const SparseVolume& reference, const SparseVolume& decoded) const;
+
   [[nodiscard]] const SparseVolume& values() const { return values_; }
   [[nodiscard]] ToneCurve tone() const { return tone_; }
 
  private:
   void toValues(SparseVolume& volume) const;
+  [[nodiscard]] double massOf(SparseVolume tones) const;
 
   const SparseVolume& values_;
   ToneCurve tone_;
@@ -50,10 +55,30 @@ class Judge {
 /// a short fit is better than without, where the values call for one.
 [[nodiscard]] ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options);
 
+/// Voxels within a bound relative to each value, and the curve whose tones they hold.
+struct RelativeLayer {
+  VoxelLayer layer;
+  ToneCurve tone;  ///< off: they hold values
+};
+[[nodiscard]] RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal);
+
+/// Checks that a decoded grid is within a bound relative to each value.
+/// \throws RuntimeFailure  a voxel is not; the text names the grid and the voxel
+void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded,
+                          const RelativeBoundGoal& goal);
+
+/// Scales the sum of a quantised grid that is judged by what is seen, so that its total mass is the source's. Errors of
+/// tones have a mean of about 0, and those of the values that they stand for do not. The bytes stay as they are.
+/// \param grid  holds tones like values, before setTone()
+void keepMass(const Job& job, StoredGrid& grid);
+
 /// The tones of a volume.
 [[nodiscard]] SparseVolume tonesOf(const SparseVolume& volume, ToneCurve tone);
 
 /// Makes a grid of tones, which was converted like one of values, a grid of values.
 void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid);
+
+/// Measures the errors of the layers of a grid again, which were those of its tones or from before keepMass().
+void measureLayers(const ConvertInput& input, StoredGrid& grid);
 
 }  // namespace esvr::encode

@@ -30,7 +30,8 @@ Activity voxelActivity(const Job& job) {
 }
 
 RoundedSigns voxelSigns(const Job& job) {
-  return job.options.fit.narrowBand ? RoundedSigns::kKept : RoundedSigns::kMayChange;
+  const bool hasSides = job.input.descriptor.gridClass == GridClass::kLevelSet;
+  return hasSides ? RoundedSigns::kKept : RoundedSigns::kMayChange;
 }
 
 DecodedValues decodedValues(const Job& job) {
@@ -189,6 +190,25 @@ VoxelCandidate exactVoxels(const Job& job) {
   return made;
 }
 
+std::optional<VoxelCandidate> smallerExactVoxels(const Job& job, const StoredGrid& quantised) {
+  const VoxelLayer& layer = *quantised.voxels;
+  if (layer.form != VoxelForm::kQuantised) return std::nullopt;
+  // The coder predicts better than by one neighbour, which saves up to two bits.
+  constexpr double kBetterPrediction = 2.0;
+  double bits = 0.0, active = 1.0;
+  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
+    const std::int32_t* codes = &layer.codes[b * kBrickVoxels];
+    for (int v = 1; v < kBrickVoxels; ++v)
+      bits += std::log2(1.0 + std::abs(double(codes[v]) - codes[v - 1]));
+    active += double(layer.active[b].count());
+  }
+  const VoxelForm form = exactLayer(valuesOf(job)).form;
+  if (bits / active < leastBitsOfExact(form) - kBetterPrediction) return std::nullopt;
+  VoxelCandidate exact = exactVoxels(job);
+  if (exact.bytes > bytesInFrame(quantised, job.options.previous)) return std::nullopt;
+  return exact;
+}
+
 // ---- Settings
 
 VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
@@ -206,7 +226,7 @@ VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
 }
 
 double VoxelSearch::price() const {
-  if (!job_.options.previous) return kTuning.price;
+  if (!job_.options.previous) return isToned(job_) ? kTuning.tonedPrice : kTuning.price;
   return job_.options.keepsPastErrors ? kTuning.framePrice : kTuning.predictedPrice;
 }
 
@@ -232,6 +252,8 @@ VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setti
   }
   ThriftyLayer thrifty = thriftyLayer(volume, std::move(layer), thrift);
   if (tooMany && thrifty.tooMany) *tooMany = *thrifty.tooMany;
+  if (seesPictures(job_) && !thrifty.tooMany)
+    thrifty.layer.divisor /= job_.judge->massFactor(volume, volumeOf(thrifty.layer));
   return std::move(thrifty.layer);
 }
 

@@ -128,6 +128,11 @@ class VoxelSearch {
 /// Exact voxels. Doubles are exact as they were read, rounded to float32.
 [[nodiscard]] VoxelCandidate exactVoxels(const Job& job);
 
+/// Exact voxels, if they take no more bytes than a grid of quantised ones, as they may where these are fine.
+/// Where few bits for each voxel make that unlikely, nothing is coded.
+[[nodiscard]] std::optional<VoxelCandidate> smallerExactVoxels(const Job& job,
+                                                               const StoredGrid& quantised);
+
 /// Estimates the bytes of a grid of exact voxels, for a large volume from a sample. The estimates of docs/lab-notes.md,
 /// "Estimating the bytes of exact voxels", are 0.94 to 1.08 times the true bytes of volumes without
 /// symmetry. A sample hardly contains mirror images and copies of bricks; with them, the estimate may be
@@ -142,7 +147,7 @@ class VoxelSearch {
 /// How voxels store the active mask of a grid: as StorageOptions say, but exactly for a level set,
 /// because the width of its band is part of its shape.
 [[nodiscard]] Activity voxelActivity(const Job& job);
-/// How voxels are rounded: with their signs if the grid is a narrow band.
+/// How voxels are rounded: with their signs if the grid is a level set.
 [[nodiscard]] RoundedSigns voxelSigns(const Job& job);
 /// Whether a reader of the grid gets halfs, as for a source that was saved as half.
 [[nodiscard]] DecodedValues decodedValues(const Job& job);

@@ -50,6 +50,7 @@ Table vdb2esvrTests() {
           {"--lossless", "Vdb2Esvr.losslessGivesBackEveryBit"},
           {"--max-error", "Vdb2Esvr.keepsEveryVoxelWithinTheBound"},
           {"--max-memory", "Vdb2Esvr.refusesWhatTakesMoreMemoryThanAllowed"},
+          {"--max-relative-error", "Vdb2EsvrOption.maxRelativeErrorHoldsAtEveryVoxel"},
           {"--max-vram", "Vdb2EsvrOption.maxVramBoundsTheDevicesMemoryOnGpu"},
           {"--measure", "Vdb2EsvrOption.measureSaysWhatAPresetMeans"},
           {"--missing", "SequenceFiles.mayBeHeldOrSkippedWhereTheyAreMissing"},

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -15,6 +16,7 @@
 #include "cli/vdb_inputs.h"
 #include "esvr/baseline.h"
 #include "esvr/container.h"
+#include "esvr/grid_coding.h"
 #include "esvr/vdb_io.h"
 #include "support/on_device.h"
 
@@ -75,6 +77,28 @@ TEST_F(Vdb2EsvrOption, picturePsnrIsReached) {
   EXPECT_GE(coarse["quality"]["psnr_t50"].get<double>(), 25.0);
   EXPECT_GE(fine["quality"]["psnr_t50"].get<double>(), 40.0);
   EXPECT_LT(coarse["bytes"].get<int>(), fine["bytes"].get<int>());
+}
+
+TEST_F(Vdb2EsvrOption, maxRelativeErrorHoldsAtEveryVoxel) {
+  const auto bytes = [&](const char* bound) {
+    return convert({"--max-relative-error", bound})["grids"][0]["bytes"].get<int>();
+  };
+  const int fine = bytes("1%"), coarse = bytes("10%");
+  EXPECT_LT(coarse, fine);
+  EXPECT_LT(bytes("1%,0.5"), fine);
+  const auto source = readGrid(at("in.vdb"), 0).volume;
+  const auto back = decodeGrid(readEsvr(at("out.esvr")).grids[0]);
+  for (std::size_t b = 0; b < source.brickCount(); ++b)
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      const double value = source.brickValues(b)[v];
+      const auto other = findBrick(back, brickOf(source.brickCorner(b) - back.origin));
+      const double made = other ? back.brickValues(*other)[v] : 0.0;
+      ASSERT_LE(std::abs(made - value), 0.01 * std::max(std::abs(value), 0.5));
+    }
+  for (const char* text : {"0", "100%", "1%,0", "1%,x", "1%,1,2", "1e400"})
+    EXPECT_EQ(test::vdb2esvr({at("in.vdb"), at("no.esvr"), "--max-relative-error", text}).exitCode,
+              2)
+        << text;
 }
 
 TEST_F(Vdb2EsvrOption, measureSaysWhatAPresetMeans) {

@@ -3,7 +3,7 @@
 // sign, which a flood fill of the empty space (EmptySigns) extends to the space without bricks. The
 // search is for values close to 0, which rounding would move to the other side: each band has some.
 // A level set with a hole, one without a negative value and one whose values exceed its background
-// are converted like other grids.
+// are converted like other grids, but for their surface, which is kept whatever values are far from it.
 // Plan: a residual gives every voxel of a narrow band the sign of its source, also for the rounding
 // differences of another machine, and belongs to all of the ellipsoids.
 
@@ -30,6 +30,7 @@
 namespace esvr {
 namespace {
 
+using encode::changeAcrossSurface;
 using Distance = std::function<double(Coord)>;
 
 double toBall(Coord v) { return std::hypot(v.x - 23.5, v.y - 23.4, v.z - 23.3) - 15.0; }
@@ -234,6 +235,65 @@ TEST(WithSigns, BelongsToAllOfTheEllipsoids) {
   const StoredGrid grid = withSigns(roughBand(volume), volume);
   EXPECT_TRUE(heaviest(grid, 1000).residual);
   EXPECT_FALSE(heaviest(grid, 3).residual);
+}
+
+// ---- Level sets that are no narrow bands
+
+/// A ball whose distances are truncated outside, with markers far from it, in a box of active voxels and with a
+/// background of 0, as simulations store obstacles.
+SparseVolume obstacle(float marker) {
+  std::vector<BrickInput> bricks;
+  for (int b = 0; b < 6 * 6 * 6; ++b) {
+    BrickInput brick{Coord{b / 36, b / 6 % 6, b % 6} * kBrickSide, {}, {}};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = brick.corner + voxelLocal(v);
+      const bool isBorder = at.x == 0 || at.y == 0 || at.z == 0;
+      brick.values[std::size_t(v)] = isBorder ? marker : float(std::min(0.5 * toBall(at), 2.5));
+      brick.active.set(v);
+    }
+    bricks.push_back(brick);
+  }
+  return makeVolume(std::move(bricks), 0.0f);
+}
+
+TEST(Surface, ChangesByTheSizeOfAVoxel) {
+  EXPECT_NEAR(*changeAcrossSurface(obstacle(1e4f)), 0.4, 0.1);
+  EXPECT_EQ(changeAcrossSurface(obstacle(1e4f)), changeAcrossSurface(obstacle(2.5f)));
+  SparseVolume outside = obstacle(1e4f);
+  for (float& value : outside.values) value = std::abs(value);
+  EXPECT_EQ(changeAcrossSurface(outside), std::nullopt);
+}
+
+TEST(Surface, IsKeptBesideMarkersOfAnySize) {
+  double bytes = 0.0;
+  for (const float marker : {2.5f, 1e4f, 1e30f}) {
+    const SparseVolume volume = obstacle(marker);
+    ASSERT_FALSE(isNarrowBand(levelSet(volume), volume));
+    const Conversion made = convertVolume({levelSet(volume), volume}, {.goal = PresetGoal{}});
+    ASSERT_TRUE(made.surfaceBound);
+    const double bound = presetSurfaceBound(Preset::kStandard) * *changeAcrossSurface(volume);
+    EXPECT_EQ(*made.surfaceBound, bound);
+    EXPECT_LE(largestDifference(volume, decodeGrid(made.grid)), bound);
+    EXPECT_EQ(compareSigns(volume, decodeGrid(made.grid)).voxels, 0u);
+    if (marker < 1e30f) bytes = std::max(bytes, double(bytesAdded(made.grid)));
+  }
+  EXPECT_LT(bytes, 0.1 * 4.0 * 48 * 48 * 48);
+}
+
+TEST(Surface, OfASizeKeepsItsSigns) {
+  const SparseVolume volume = obstacle(1e4f);
+  const Conversion made = convertVolume({levelSet(volume), volume}, {.goal = SizeGoal{3000}});
+  EXPECT_TRUE(made.grid.voxels);
+  EXPECT_LE(bytesAdded(made.grid), 3000u);
+  EXPECT_EQ(compareSigns(volume, decodeGrid(made.grid)).voxels, 0u);
+}
+
+TEST(Surface, IsNoMeasureOfOtherGoalsAndGrids) {
+  const SparseVolume volume = obstacle(1e4f);
+  EXPECT_FALSE(convertVolume({levelSet(volume), volume}, {.goal = BoundGoal{0.3}}).surfaceBound);
+  GridDescriptor fog = levelSet(volume);
+  fog.gridClass = GridClass::kUnknown;
+  EXPECT_FALSE(convertVolume({fog, volume}, {.goal = SizeGoal{3000}}).surfaceBound);
 }
 
 }  // namespace

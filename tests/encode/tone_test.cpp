@@ -2,12 +2,16 @@
 // states, and are odd and monotone. A smoke of a wide range gets a curve and is better seen with it at the same
 // size; a volume of a narrow range, a signed one and a bounded one get none. The goals of pictures are reached, and
 // the decoded values stay within the range of the source. A curve comes back from a file, and exact voxels have none.
+// The total mass is kept. A bound relative to each value holds for signed, tiny and huge values, halfs and backgrounds.
 
 #include "esvr/tone.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "encode/volumes.h"
@@ -120,6 +124,91 @@ TEST(Tone, IsNotUsedWhereItDoesNotServe) {
   EXPECT_FALSE(converted(volume, {.goal = BoundGoal{0.01, true}}).grid.tone.isOn());
   const Conversion tube = converted(test::tubeVolume(), {.goal = SizeGoal{900}});
   EXPECT_FALSE(tube.grid.tone.isOn());  // its values differ too little
+}
+
+TEST(Tone, KeepsTheTotalMass) {
+  const SparseVolume volume = smoke();
+  for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
+    const Conversion made =
+        converted(volume, {.goal = PictureGoal{30.0}, .representation = representation});
+    const VolumeMetrics m = compareVolumes(volume, decodeGrid(made.grid));
+    EXPECT_NEAR(m.massCandidate / m.massReference, 1.0, 1e-3);
+  }
+}
+
+/// The largest error relative to max(|v|, floor).
+double relativeError(const SparseVolume& volume, const SparseVolume& decoded, double floor) {
+  double largest = 0.0;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const auto other = findBrick(decoded, brickOf(volume.brickCorner(b) - decoded.origin));
+    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
+      const double value = volume.brickValues(b)[v];
+      const double made = other ? decoded.brickValues(*other)[v] : decoded.background;
+      if (made != value)
+        largest = std::max(largest, std::abs(made - value) / std::max(std::abs(value), floor));
+    }
+  }
+  return largest;
+}
+
+TEST(RelativeBound, HoldsAtEveryVoxel) {
+  SparseVolume volume = smoke();
+  for (std::size_t b = 0; b < volume.brickCount(); b += 2)
+    for (float& value : volume.brickValues(b)) value = -value;
+  for (const double share : {0.2, 0.01, 1e-4})
+    for (const double floor : {1e-4, 0.03, 5.0}) {
+      const Conversion made = converted(volume, {.goal = RelativeBoundGoal{share, floor}});
+      EXPECT_LE(relativeError(volume, decodeGrid(made.grid), floor), share);
+      EXPECT_GT(relativeError(volume, decodeGrid(made.grid), floor), 0.3 * share);
+    }
+}
+
+TEST(RelativeBound, HoldsForHalfs) {
+  SparseVolume volume = smoke();
+  roundToHalfs(volume);
+  GridDescriptor descriptor = fog();
+  descriptor.valueType = ValueType::kHalf;
+  std::uint64_t before = 0;
+  for (const double share : {1e-5, 3e-4, 1e-3, 0.01, 0.1}) {
+    const Conversion made =
+        convertVolume({descriptor, volume}, {.goal = RelativeBoundGoal{share, 1e-3}});
+    EXPECT_LE(relativeError(volume, decodeGrid(made.grid), 1e-3), share);
+    if (before > 0) {
+      EXPECT_LE(bytesAdded(made.grid), before);
+    }
+    before = bytesAdded(made.grid);
+  }
+}
+
+TEST(RelativeBound, OfTinyAndHugeValues) {
+  SparseVolume volume = smoke();
+  std::size_t n = 0;
+  for (float& value : volume.values)
+    if (value != 0.0f) value = std::ldexp(value, int(n++ % 240) - 120);
+  *std::ranges::find_if(volume.values, [](float v) { return v != 0.0f; }) = 1e-45f;
+  for (const std::optional<double> floor : {std::optional<double>{}, {1e-30}, {1e30}}) {
+    const Conversion made = converted(volume, {.goal = RelativeBoundGoal{0.01, floor}});
+    EXPECT_LE(relativeError(volume, decodeGrid(made.grid), floor.value_or(1e-45)), 0.01);
+  }
+}
+
+TEST(RelativeBound, WithABackgroundIsThatOfTheSmallestValue) {
+  SparseVolume volume = smoke();
+  for (float& value : volume.values) value += 280.0f;
+  setBackground(280.0f, volume);
+  const Conversion made = converted(volume, {.goal = RelativeBoundGoal{0.001}});
+  EXPECT_FALSE(made.grid.tone.isOn());
+  EXPECT_LE(relativeError(volume, decodeGrid(made.grid), 1.0), 0.001);
+}
+
+TEST(RelativeBound, RefusesWhatIsNoBound) {
+  const SparseVolume volume = smoke();
+  for (const auto& goal : {RelativeBoundGoal{0.0}, RelativeBoundGoal{1.0}, RelativeBoundGoal{NAN},
+                           RelativeBoundGoal{0.1, 0.0}, RelativeBoundGoal{0.1, 1e300}})
+    EXPECT_THROW((void)converted(volume, {.goal = goal}), UsageError);
+  EXPECT_THROW((void)converted(volume, {.goal = RelativeBoundGoal{0.1},
+                                        .representation = Representation::kEllipsoids}),
+               UsageError);
 }
 
 TEST(Tone, OfAGivenScaleServesSignedValues) {

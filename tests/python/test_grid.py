@@ -21,6 +21,8 @@ def test_a_fit_is_near_its_source(volume, grid):
 def test_goals_are_reached(volume):
     assert esvr.compare(volume, esvr.fit(volume, psnr=50, device="cpu")).psnr_box >= 50.0
     assert esvr.compare(volume, esvr.fit(volume, max_error=0.01)).max_error <= 0.01
+    relative = esvr.fit(volume, max_relative_error=0.01, relative_floor=1.0)
+    assert 0.0 < esvr.compare(volume, relative).max_error <= 0.01 * max(1.0, *map(abs, volume.value_range))
     assert esvr.compare(volume, esvr.fit(volume, lossless=True)).max_error == 0.0
     assert esvr.fit(volume, size=2000, device="cpu").bytes <= 2000
 
@@ -28,6 +30,8 @@ def test_goals_are_reached(volume):
 def test_goals_exclude_each_other(volume):
     with pytest.raises(esvr.UsageError, match="exclude"):
         esvr.fit(volume, psnr=30, count=10)
+    with pytest.raises(esvr.UsageError, match="relative_floor"):
+        esvr.fit(volume, relative_floor=0.1)
     with pytest.raises(esvr.UsageError, match="preset is one of draft"):
         esvr.fit(volume, preset="best")
     with pytest.raises(esvr.BadInput):

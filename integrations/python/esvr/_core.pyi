@@ -192,7 +192,8 @@ def write(path: Union[str, PathLike[str]], file: File, *, overwrite: bool = Fals
 @overload
 def write(path: Union[str, PathLike[str]], grids: SequenceOf[Grid], *, overwrite: bool = False) -> int: ...
 def fit(volume: Volume, *, psnr: Optional[float] = None, picture_psnr: Optional[float] = None,
-        max_error: Optional[float] = None, size: Optional[int] = None, count: Optional[int] = None,
+        max_error: Optional[float] = None, max_relative_error: Optional[float] = None,
+        relative_floor: Optional[float] = None, size: Optional[int] = None, count: Optional[int] = None,
         lossless: bool = False, preset: str = "standard", measure: str = "auto", tone: Optional[float] = None,
         effort: int = 5, representation: str = "auto", storage: str = "compact", device: str = "auto",
         seed: int = 1, progress: Optional[Callable[[float], object]] = None) -> Grid: ...

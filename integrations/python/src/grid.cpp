@@ -228,7 +228,7 @@ constexpr Word<Storage> kStorages[] = {{"compact", Storage::kCompact},
 
 /// The goals of which one may be given.
 struct Goals {
-  std::optional<double> psnr, picturePsnr, maxError;
+  std::optional<double> psnr, picturePsnr, maxError, maxRelativeError, relativeFloor;
   std::optional<std::uint64_t> size;
   std::optional<std::size_t> count;
   bool lossless = false;
@@ -236,12 +236,18 @@ struct Goals {
 
 Goal goalOf(const Goals& g) {
   const int given = g.psnr.has_value() + g.picturePsnr.has_value() + g.maxError.has_value() +
-                    g.size.has_value() + g.count.has_value() + g.lossless;
+                    g.maxRelativeError.has_value() + g.size.has_value() + g.count.has_value() +
+                    g.lossless;
   if (given > 1)
-    throw UsageError("psnr, picture_psnr, max_error, size, count and lossless exclude each other");
+    throw UsageError(
+        "psnr, picture_psnr, max_error, max_relative_error, size, count and lossless exclude each "
+        "other");
+  if (g.relativeFloor && !g.maxRelativeError)
+    throw UsageError("relative_floor belongs to max_relative_error");
   if (g.psnr) return PsnrGoal{*g.psnr};
   if (g.picturePsnr) return PictureGoal{*g.picturePsnr};
   if (g.maxError) return BoundGoal{.bound = *g.maxError};
+  if (g.maxRelativeError) return RelativeBoundGoal{*g.maxRelativeError, g.relativeFloor};
   if (g.size) return SizeGoal{*g.size};
   if (g.lossless) return LosslessGoal{};
   if (g.count) return FitGoal{};
@@ -320,12 +326,15 @@ constexpr const char* kFitText =
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
     "lossless: every active voxel bit for bit; picture_psnr: the smallest grid whose "
     "transmittance\n"
-    "has this PSNR (Metrics.psnr_t50), of a volume that is looked through. The default is the "
-    "quality\n"
+    "has this PSNR (Metrics.psnr_t50), of a volume that is looked through; max_relative_error: a\n"
+    "bound on the error of every voxel relative to its magnitude, such as 0.01, or to "
+    "relative_floor\n"
+    "where that is larger (default: the smallest magnitude above 0). The default is the quality\n"
     "of the preset ('draft', 'standard' or 'high').\n\n"
     "measure: what the quality of a preset and of a size means. 'auto': what is seen of a volume "
     "that\n"
-    "is looked through, and the PSNR of values otherwise; 'values': the PSNR of values.\n"
+    "is looked through, the surface of a level set that is no narrow band, and the PSNR of values\n"
+    "otherwise; 'values': the PSNR of values.\n"
     "tone: the scale of the tone curve; None: it is chosen where the measure is what is seen; 0: "
     "none.\n"
     "effort: how long the conversion may take, from 1 to 9.\n"
@@ -340,17 +349,19 @@ void addFit(py::module_& module) {
   module.def(
       "fit",
       [](const Volume& volume, std::optional<double> psnr, std::optional<double> picturePsnr,
-         std::optional<double> maxError, std::optional<std::uint64_t> size,
+         std::optional<double> maxError, std::optional<double> maxRelativeError,
+         std::optional<double> relativeFloor, std::optional<std::uint64_t> size,
          std::optional<std::size_t> count, bool lossless, const std::string& preset,
          const std::string& measure, std::optional<float> tone, int effort,
          const std::string& representation, const std::string& storage, const std::string& device,
          std::uint64_t seed, const Progress& progress) {
         ConvertOptions options;
-        options.goal = goalOf({psnr, picturePsnr, maxError, size, count, lossless});
+        options.goal = goalOf(
+            {psnr, picturePsnr, maxError, maxRelativeError, relativeFloor, size, count, lossless});
         options.measure = valueOf("measure", measure, kMeasures);
         if (tone && !(std::isfinite(*tone) && *tone >= 0.0f))
           throw UsageError("tone is a scale above 0, or 0 for no tone curve");
-        if (tone && *tone > 0.0f && (lossless || maxError))
+        if (tone && *tone > 0.0f && (lossless || maxError || maxRelativeError))
           throw UsageError("a tone curve has no bound on the error of a voxel");
         if (tone) options.tone = ToneCurve{*tone};
         options.representation = valueOf("representation", representation, kRepresentations);
@@ -367,6 +378,7 @@ void addFit(py::module_& module) {
       },
       py::arg("volume"), py::kw_only(), py::arg("psnr") = py::none(),
       py::arg("picture_psnr") = py::none(), py::arg("max_error") = py::none(),
+      py::arg("max_relative_error") = py::none(), py::arg("relative_floor") = py::none(),
       py::arg("size") = py::none(), py::arg("count") = py::none(), py::arg("lossless") = false,
       py::arg("preset") = "standard", py::arg("measure") = "auto", py::arg("tone") = py::none(),
       py::arg("effort") = kUsualEffort, py::arg("representation") = "auto",

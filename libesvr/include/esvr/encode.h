@@ -30,7 +30,8 @@ namespace esvr {
 struct FitGoal {};
 
 /// The smallest grid found with the quality that FitOptions::preset stands for: presetPicturePsnr() if the
-/// measure is what is seen, and otherwise an error of at most that of presetPsnr() over the active voxels.
+/// measure is what is seen, presetSurfaceBound() for a level set that is no narrow band (isNarrowBand,
+/// grid_coding.h), and otherwise an error of at most that of presetPsnr() over the active voxels.
 /// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
 /// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {};
@@ -63,26 +64,42 @@ struct BoundGoal {
   bool relative = false;
 };
 
+/// A grid of voxels whose errors are at most a share of each value: |error| <= share max(|value|, floor). With a
+/// background of 0, voxels are stored on the lattice of a tone curve (tone.h), whose steps grow with the
+/// values; otherwise all have the bound that suits the smallest value.
+struct RelativeBoundGoal {
+  double share = 0.0;  ///< above 0 and below 1
+  /// Magnitude below which the bound no longer falls, above 0. Default: the smallest magnitude above 0 of the
+  /// active values.
+  std::optional<double> floor{};
+};
+
 /// A grid that restores every voxel and the active mask bit for bit. It holds voxels.
 struct LosslessGoal {};
 
-using Goal =
-    std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, BoundGoal, LosslessGoal>;
+using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, BoundGoal,
+                          RelativeBoundGoal, LosslessGoal>;
 
 /// PSNR over the active voxels that a preset stands for, dB, and that of the transmittance.
 [[nodiscard]] double presetPsnr(Preset preset);
 [[nodiscard]] double presetPicturePsnr(Preset preset);
 
+/// The largest error of a value of a level set that a preset stands for, relative to the change of the values by
+/// one voxel across the surface: about the largest distance by which the surface moves, in voxels.
+[[nodiscard]] double presetSurfaceBound(Preset preset);
+
 /// What the quality of a PresetGoal and of a SizeGoal means.
 enum class Measure {
   /// What is seen of a volume that is looked through (isLookedThrough, metrics.h; background 0): the PSNR
   /// of its transmittance for T = 0.5, unless the PSNR over the active voxels limits it: it may be 4 dB
-  /// lower with a tone curve, and must be 2 dB higher without one. For any other volume, as kValues.
+  /// lower with a tone curve, and must be 2 dB higher without one. A level set that is no narrow band is
+  /// judged by its surface, since its values far from it, such as markers of empty space, may be of any size:
+  /// it is stored as voxels, with presetSurfaceBound() for a preset. For any other volume, as kValues.
   kAuto,
   kValues  ///< the PSNR of values
 };
 
-/// What a stored grid consists of. A BoundGoal and a LosslessGoal always store voxels.
+/// What a stored grid consists of. Goals with a bound and a LosslessGoal always store voxels.
 enum class Representation {
   /// Ellipsoids or voxels: those with the higher PSNR for a SizeGoal, and those that take fewer
   /// bytes for a PsnrGoal and a PresetGoal; exact voxels where they take hardly more. A FitGoal
@@ -121,7 +138,8 @@ struct ConvertOptions {
   Measure measure = Measure::kAuto;
   /// The tone curve by which values are coded (tone.h). A curve without a scale is none. Default: for
   /// the goals that are measured in pictures, one that is chosen from the values and by short fits; none
-  /// otherwise. A BoundGoal, a LosslessGoal and a background other than 0 have none in any case.
+  /// otherwise. A BoundGoal, a LosslessGoal and a background other than 0 have none in any case, and a
+  /// RelativeBoundGoal has one of its own.
   std::optional<ToneCurve> tone{};
   FitOptions fit{};  ///< narrowBand is set by the conversion
   StorageOptions storage{};
@@ -205,6 +223,8 @@ struct Conversion {
   /// True if the goal was measured by what is seen (Measure::kAuto, PictureGoal). The figures of candidates
   /// in dB then are those of this measure.
   bool byPictures = false;
+  /// The bound on the errors of a level set that was judged by its surface, value units.
+  std::optional<double> surfaceBound{};
   /// True if ellipsoids were not tried because fitting them would take longer than the effort allows.
   bool fitsTookTooLong = false;
   /// Bytes of exact voxels, estimated from a sample, if they are fewer than those of the ellipsoids
