@@ -90,6 +90,7 @@ def axes_from_letters(letters, shape, path):
 
 
 # -- orientation ---------------------------------------------------------------------------------------------------
+LPS, RAS = "left-posterior-superior", "right-anterior-superior"
 LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -295,6 +296,10 @@ class Image:
         for kind in set(kinds):
             if kinds.count(kind) > 1:
                 raise esvr.BadInput(f"{self.path}: two axes of the image are {kind} ({', '.join(a.text() for a in self.axes)})")
+
+    def name_channels(self, labels):
+        if self.axis(CHANNEL) and len(labels) == self.axis(CHANNEL).size and any(labels):
+            self.axis(CHANNEL).labels = labels
 
     def axis(self, kind):
         return next((axis for axis in self.axes if axis.kind == kind), None)

@@ -7,7 +7,7 @@ import numpy as np
 
 import esvr
 
-from . import program, read_dicom, read_science, read_tiff, read_volumes
+from . import program, read_dicom, read_nrrd, read_science, read_tiff, read_volumes
 from .image import BRICK, TIME, VECTOR, Part, affine_of, factor, head_of, natural, reading, unit_named
 from .program import Option, Program, byte_size, number
 
@@ -74,66 +74,71 @@ def read_one_dicom(path, options):
     return read_dicom.read_dicom([path], options)
 
 
-TIFF, NRRD, NIFTI, MRC = read_tiff.read_tiff, read_volumes.read_nrrd, read_volumes.read_nifti, read_volumes.read_mrc
-HDF5, NETCDF, VTI, NPY = read_science.read_hdf5, read_science.read_netcdf, read_volumes.read_vti, read_volumes.read_npy
-NETCDF_NAMES = (".nc", ".nc4", ".cdf")
-BY_CONTENT = [(0, (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), TIFF), (0, (b"NRRD",), NRRD), (0, (b"\x93NUMPY",), NPY),
-              (344, (b"n+1\0", b"ni1\0"), NIFTI), (4, (b"n+2\0", b"ni2\0"), NIFTI), (208, (b"MAP ",), MRC), (0, (b"CDF",), NETCDF),
-              *((at, (b"\x89HDF\r\n\x1a\n",), HDF5) for at in (0, 512, 1024, 2048))]
-BY_NAME = {(".tif", ".tiff"): TIFF, (".nrrd", ".nhdr"): NRRD, (".nii", ".hdr", ".img"): NIFTI,
-           (".mha", ".mhd"): read_volumes.read_metaimage, (".mrc", ".map", ".ccp4", ".rec", ".st", ".mrcs"): MRC, (".vti",): VTI,
-           (".h5", ".hdf5", ".hdf"): HDF5, NETCDF_NAMES: NETCDF, (".npy",): NPY, (".dcm",): read_one_dicom,
-           (".zarr", ".zarr.zip", ".ozx"): read_science.read_zarr}
+# The name of a format, its reader, how names of its files end, and by what its files begin at some place.
+FORMATS = [
+    ("TIFF", read_tiff.read_tiff, (".tif", ".tiff"), 0, (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")),
+    ("NRRD", read_nrrd.read_nrrd, (".nrrd", ".nhdr"), 0, b"NRRD"),
+    ("NIfTI", read_volumes.read_nifti, (".nii", ".hdr", ".img"), 344, (b"n+1\0", b"ni1\0")),
+    ("NIfTI", read_volumes.read_nifti, (), 4, (b"n+2\0", b"ni2\0")),
+    ("MetaImage", read_nrrd.read_metaimage, (".mha", ".mhd"), 0, ()),
+    ("MRC", read_volumes.read_mrc, (".mrc", ".map", ".ccp4", ".rec", ".st", ".mrcs"), 208, b"MAP "),
+    ("VTI", read_volumes.read_vti, (".vti",), 0, ()),
+    ("netCDF", read_science.read_netcdf, (".nc", ".nc4", ".cdf"), 0, b"CDF"),
+    *[("HDF5", read_science.read_hdf5, (".h5", ".hdf5", ".hdf"), at, b"\x89HDF\r\n\x1a\n") for at in (0, 512, 1024, 2048)],
+    ("NPY", read_volumes.read_npy, (".npy",), 0, b"\x93NUMPY"),
+    ("DICOM", read_one_dicom, (".dcm",), 128, b"DICM"),
+    ("Zarr", read_science.read_zarr, (".zarr", ".zarr.zip", ".ozx"), 0, ())]
+TIFF, VTI, NETCDF, DICOM = (next(f for f in FORMATS if f[0] == name) for name in ("TIFF", "VTI", "netCDF", "DICOM"))
 
 
 def format_of(path):
-    """The reader of a file, by its content or else by its name."""
-    with reading(path, "an image"):
-        head = head_of(path, 4096)
-        if read_dicom.is_dicom(path):
-            return read_one_dicom
-    name = os.fspath(path).lower().removesuffix(".gz")
-    for at, words, reader in BY_CONTENT:
-        if head[at:].startswith(words):
-            return NETCDF if reader is HDF5 and name.endswith(NETCDF_NAMES) else reader
+    """The format of a file, by its content or else by its name."""
+    head = head_of(path, 4096)
+    if read_dicom.is_dicom(path):
+        return DICOM
+    name = path.lower().removesuffix(".gz")
+    by_name = next((f for f in FORMATS if f[2] and name.endswith(f[2])), ("RAW", read_volumes.read_raw))
     if b"<VTKFile" in head:
         return VTI
-    return next((reader for endings, reader in BY_NAME.items() if name.endswith(endings)), read_volumes.read_raw)
+    found = next((f for f in FORMATS if f[4] and head[f[3]:].startswith(f[4])), by_name)
+    return NETCDF if found[0] == "HDF5" and by_name is NETCDF else found
 
 
 def open_image(paths, options):
     """The image of a file, of slices, or of a folder."""
     paths = [os.fspath(path) for path in paths]
-    if len(paths) == 1 and os.path.isdir(paths[0]):
-        return open_folder(paths[0], options)
     if len(paths) == 1 and not os.path.exists(paths[0]):
         paths = read_tiff.files_of_pattern(paths[0]) or paths
+    if len(paths) == 1 and os.path.isdir(paths[0]):
+        return open_folder(paths[0], options)
     for path in paths:
         if not os.path.isfile(path):
             raise esvr.BadInput(f"{path} cannot be read: No such file")
-    reader = format_of(paths[0])
-    if len(paths) > 1:
-        if reader not in (TIFF, read_one_dicom):
-            raise esvr.UsageError(f"several files make one image only if they are TIFF or DICOM, and {paths[0]} is not")
-        return read_tiff.read_stack(paths, options) if reader is TIFF else read_dicom.read_dicom(paths, options)
-    if (options.dims or options.type) and reader is not read_volumes.read_raw:
+    with reading(paths[0], "an image"):
+        name, read = format_of(paths[0])[:2]
+    if name not in ("TIFF", "DICOM") and len(paths) > 1:
+        raise esvr.UsageError(f"several files make one image only if they are TIFF or DICOM, and {paths[0]} is not")
+    if (options.dims or options.type) and name != "RAW":
         raise esvr.UsageError(f"--dims and --type are for RAW images only, and {paths[0]} has a format of its own")
-    return reader(paths[0], options)
+    with reading(paths[0], name):
+        return read(paths[0], options) if len(paths) == 1 else \
+            read_tiff.read_stack(paths, options) if name == "TIFF" else read_dicom.read_dicom(paths, options)
 
 
 def open_folder(folder, options):
     """A folder is a Zarr image, a stack of TIFF files, or series of DICOM files that may lie in folders of their own."""
-    if read_science.is_zarr(folder):
-        return read_science.read_zarr(folder, options)
-    slices = [os.path.join(folder, name) for name in sorted(os.listdir(folder), key=natural)
-              if name.lower().endswith((".tif", ".tiff"))]
-    if slices:
-        return read_tiff.read_stack(slices, options)
-    paths = [os.path.join(parent, name) for parent, _, names in sorted(os.walk(folder)) for name in sorted(names, key=natural)]
-    paths = [path for path in paths if os.path.isfile(path) and read_dicom.is_dicom(path)]
-    if not paths:
-        raise esvr.BadInput(f"{folder} has no TIFF and no DICOM file, and is no Zarr image")
-    return read_dicom.read_dicom(paths, options, folder)
+    with reading(folder, "an image"):
+        if read_science.is_zarr(folder):
+            return read_science.read_zarr(folder, options)
+        slices = [os.path.join(folder, name) for name in sorted(os.listdir(folder), key=natural)
+                  if name.lower().endswith((".tif", ".tiff"))]
+        if slices:
+            return read_tiff.read_stack(slices, options)
+        paths = [os.path.join(parent, name) for parent, _, names in sorted(os.walk(folder)) for name in sorted(names, key=natural)]
+        paths = [path for path in paths if os.path.isfile(path) and read_dicom.is_dicom(path)]
+        if not paths:
+            raise esvr.BadInput(f"{folder} has no TIFF and no DICOM file, and is no Zarr image")
+        return read_dicom.read_dicom(paths, options, folder)
 
 
 # -- choices -------------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import numpy as np
 
 import esvr
 
-from .image import LPS_TO_RAS, TIME, Axis, Image, affine_of, natural, need, planes, product, reading, require_bytes
+from .image import LPS, LPS_TO_RAS, TIME, Axis, Image, affine_of, natural, need, planes, product, reading, require_bytes
 
 EVEN = 0.01  # by this share of a slice, distances of slices may differ
 SAME = ("Rows", "Columns", "SamplesPerPixel", "BitsAllocated", "PixelRepresentation", "PhotometricInterpretation")
@@ -41,15 +41,14 @@ def read_dicom(paths, options, folder=None):
             series.setdefault(str(header.get("SeriesInstanceUID", "")), []).append((path, header))
     if not series:
         raise esvr.BadInput(f"{where} has no DICOM image")
-    with reading(where, "DICOM"):
-        files = chosen_series(where, series, options)
-        header = files[0][1]
-        for path, other in files:
-            for name in SAME:
-                if other.get(name) != header.get(name):
-                    raise esvr.BadInput(f"{path} has {name} {other.get(name)}, and {files[0][0]} has {header.get(name)}; slices of "
-                                        "one image have one size and type")
-        return image_of(where, header, [frame for path, other in files for frame in frames_of(path, other)], options)
+    files = chosen_series(where, series, options)
+    header = files[0][1]
+    for path, other in files:
+        for name in SAME:
+            if other.get(name) != header.get(name):
+                raise esvr.BadInput(f"{path} has {name} {other.get(name)}, and {files[0][0]} has {header.get(name)}; slices of one "
+                                    "image have one size and type")
+    return image_of(where, header, [frame for path, other in files for frame in frames_of(path, other)], options)
 
 
 def chosen_series(where, series, options):
@@ -143,7 +142,7 @@ def image_of(where, header, frames, options):
     if samples > 1:
         axes.append(Axis("sample", samples))
     dtype, fetch, scale, missing = numbers_of(volumes, samples, options)
-    metadata = {} if without else {"image_space": "left-posterior-superior"}
+    metadata = {} if without else {"image_space": LPS}
     if header.get("RescaleType"):
         metadata["value_unit"] = str(header.RescaleType)
     return Image("DICOM", where, axes, dtype, fetch, LPS_TO_RAS @ affine, "mm" if first.spacing is not None else None, scale,

@@ -8,8 +8,8 @@ import numpy as np
 
 import esvr
 
-from .image import CHANNEL, TIME, Axis, Image, affine_of, affine_of_steps, axes_from_letters, by, factor, kind_named, mapped, \
-    missing_if_any, natural, need, planes, product, reading, require_bytes, unit_named
+from .image import (CHANNEL, TIME, Axis, Image, affine_of, affine_of_steps, axes_from_letters, by, factor, kind_named, mapped,
+                    missing_if_any, natural, need, planes, product, reading, require_bytes, unit_named)
 from .program import number_mark
 
 TIFF_AXES = {"X": "x", "Y": "y", "Z": "z", "C": CHANNEL, "S": "sample", "T": TIME, "Q": "page", "I": "page"}
@@ -46,19 +46,25 @@ def files_of_pattern(text):
 
 def read_stack(paths, options):
     """A file for each slice. A file of several slices among them makes one longer stack."""
-    images = [read_tiff(path, options) for path in paths]
+    images = []
+    for path in paths:
+        with reading(path, "TIFF"):
+            images.append(read_tiff(path, options))
     first = images[0]
     if len(images) == 1:
         return first
+
+    def pixels(image):
+        return f"{image.size[0]} x {image.size[1]} pixels of {image.dtype.name}"
+
+    def others(image):
+        return [(a.kind, a.size) for a in image.axes if a.kind != "z"], [f"{n:.6g}" for n in image.affine.flat], image.unit, image.scale
     for image in images[1:]:
-        if image.size[:2] != first.size[:2] or image.dtype != first.dtype:
-            raise esvr.BadInput(f"{image.path} has {image.size[0]} x {image.size[1]} pixels of {image.dtype.name}, and "
-                                f"{first.path} has {first.size[0]} x {first.size[1]} of {first.dtype.name}; slices of one image "
-                                "have one size and type")
-        if [(a.kind, a.size) for a in image.axes if a.kind != "z"] != [(a.kind, a.size) for a in first.axes if a.kind != "z"]:
-            raise esvr.BadInput(f"{image.path} has other axes than {first.path}")
-        if image.scale != first.scale or not np.allclose(image.affine, first.affine) or image.unit != first.unit:
-            raise esvr.BadInput(f"{image.path} has another pixel size or calibration than {first.path}")
+        if pixels(image) != pixels(first):
+            raise esvr.BadInput(f"{image.path} has {pixels(image)}, and {first.path} has {pixels(first)}; slices of one image have one "
+                                "size and type")
+        if others(image) != others(first):
+            raise esvr.BadInput(f"{image.path} has other axes, another pixel size or another calibration than {first.path}")
     slices = [(image, z) for image in images for z in range(image.size[2])]
 
     def read(number, index):
@@ -71,7 +77,7 @@ def read_stack(paths, options):
                   planes([len(slices)], read), first.affine, first.unit, first.scale, first.missing, warnings=first.warnings)
     if first.unit and not any("distance" in text for text in stack.warnings) and first.axis("z") is None:
         stack.warnings.append("the distance of slices is not in the files, and is taken to be the edge of a pixel or 1")
-    if [os.fspath(p) for p in paths] != sorted(map(os.fspath, paths), key=natural):
+    if paths != sorted(paths, key=natural):
         stack.warnings.append("the slices are in the order given, which is not that of the numbers in their names")
     return stack
 
@@ -79,34 +85,32 @@ def read_stack(paths, options):
 # -- one file ------------------------------------------------------------------------------------------------------
 def read_tiff(path, options):
     tifffile = need("tifffile", "python3-tifffile", path, "TIFF")
-    with reading(path, "TIFF"):
-        file = tifffile.TiffFile(path)
-        if "openmicroscopy.org" in (file.pages.first.description or "") and not file.is_ome:
-            raise esvr.BadInput(f"{path}: its OME-XML is damaged")
-        series, number = series_of(path, file, options.dataset)
-        page = next((page.keyframe for page in series.pages if page is not None), file.pages.first)
-        if page.dtype is None:
-            raise esvr.BadInput(f"{path} has {page.bitspersample} bits a sample, in a form that is not read")
-        letters = series.axes
-        if file.is_imagej and not is_scifio(file):
-            letters = imagej_axes(file, letters)
-        elif set(letters) & {"Q", "I"} and "Z" not in letters:
-            letters = letters.replace("Q" if "Q" in letters else "I", "Z", 1)
-        axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
-            Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
-        # What descriptions say of lengths and values. A distance of slices that is not known is None.
-        space = SimpleNamespace(spacing=[1.0, 1.0, 1.0], origin=[0.0, 0.0, 0.0], unit=None, scale=None, labels=[], warnings=[])
-        describe(path, file, file.pages.first, space, number, options)
-        nodata = page.tags.get("GDAL_NODATA")
-        if space.spacing[2] is None:
-            space.spacing[2] = space.spacing[0]
-            if next((axis.size for axis in axes if axis.kind == "z"), 1) > 1:
-                space.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
-        image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine_of(space.spacing, space.origin),
-                      space.unit, space.scale, missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=space.warnings)
-        file.filehandle.close()  # a process may open some 1,000 files, and a stack may have more
-    if image.axis(CHANNEL) and len(space.labels) == image.axis(CHANNEL).size and any(space.labels):
-        image.axis(CHANNEL).labels = space.labels
+    file = tifffile.TiffFile(path)
+    if "openmicroscopy.org" in (file.pages.first.description or "") and not file.is_ome:
+        raise esvr.BadInput(f"{path}: its OME-XML is damaged")
+    series, number = series_of(path, file, options.dataset)
+    page = next((page.keyframe for page in series.pages if page is not None), file.pages.first)
+    if page.dtype is None:
+        raise esvr.BadInput(f"{path} has {page.bitspersample} bits a sample, in a form that is not read")
+    letters = series.axes
+    if file.is_imagej and not is_scifio(file):
+        letters = imagej_axes(file, letters)
+    elif set(letters) & {"Q", "I"} and "Z" not in letters:
+        letters = letters.replace("Q" if "Q" in letters else "I", "Z", 1)
+    axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
+        Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
+    # What descriptions say of lengths and values. A distance of slices that is not known is None.
+    space = SimpleNamespace(spacing=[1.0, 1.0, 1.0], origin=[0.0, 0.0, 0.0], unit=None, scale=None, labels=[], warnings=[])
+    describe(path, file, file.pages.first, space, number, options)
+    if space.spacing[2] is None:
+        space.spacing[2] = space.spacing[0]
+        if any(axis.kind == "z" and axis.size > 1 for axis in axes):
+            space.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
+    nodata = page.tags.get("GDAL_NODATA")
+    image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine_of(space.spacing, space.origin),
+                  space.unit, space.scale, missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=space.warnings)
+    image.name_channels(space.labels)
+    file.filehandle.close()  # a process may open some 1,000 files, and a stack may have more
     return image
 
 

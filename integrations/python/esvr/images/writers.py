@@ -13,7 +13,7 @@ import numpy as np
 
 import esvr
 
-from .image import LPS_TO_RAS, need, product
+from .image import LPS, LPS_TO_RAS, need, product
 
 INTEGERS = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"]
 TYPES = {"NIfTI": INTEGERS + ["float32", "float64"], "NRRD": INTEGERS + ["float32", "float64"],
@@ -69,7 +69,7 @@ NRRD_NAMES = {"int8": "int8", "uint8": "uint8", "float32": "float", "float64": "
 def write_nrrd(path, volume):
     space = volume.metadata.get("image_space")
     matrix = volume.matrix_in(volume.unit)
-    if space == "left-posterior-superior":
+    if space == LPS:
         matrix = LPS_TO_RAS @ matrix
     is_vector = volume.components == 3
     directions = " ".join(f"({','.join(repr(float(n)) for n in matrix[:3, column])})" for column in range(3))
@@ -83,7 +83,7 @@ def write_nrrd(path, volume):
         lines.append("space units: " + " ".join([f'"{volume.unit}"'] * 3))
     if "value_unit" in volume.metadata:
         lines.append(f"sample units: {volume.metadata['value_unit']}")
-    turn = LPS_TO_RAS[:3, :3] if space == "left-posterior-superior" else None
+    turn = LPS_TO_RAS[:3, :3] if space == LPS else None
     volume.save(path, ("\n".join(lines) + "\n\n").encode(), turn=turn)
 
 
