@@ -78,8 +78,8 @@ def convert_all(*words):
     made = []
     for _, parts in image2vdb.chosen_parts(image, arguments):
         for name, part in parts:
-            grid, tally, _ = image2vdb.convert(name, part, arguments, Quiet())
-            made.append(Converted(grid, image.warnings, image.notes, tally.missing))
+            grid, conversion = image2vdb.convert(name, part, arguments, Quiet())
+            made.append(Converted(grid, image.warnings, image.notes, conversion.missing))
     return made
 
 

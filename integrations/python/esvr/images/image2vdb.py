@@ -8,10 +8,10 @@ import numpy as np
 import esvr
 
 from . import program, read_dicom, read_nrrd, read_science, read_tiff, read_volumes
-from .image import BRICK, TIME, VECTOR, Part, affine_of, factor, head_of, natural, reading, unit_named
-from .program import Option, Program, byte_size, number
+from .image import BRICK, TIME, VECTOR, Part, affine_of, factor, head_of, natural, reading
+from .program import Option, Program, byte_size, length_unit, number
 
-EXACT = {"float": 2 ** 24, "vec3s": 2 ** 24, "double": 2 ** 53}  # up to here, grids of these types hold every whole number
+EXACT = {"float": 24, "vec3s": 24, "double": 53, "int64": 63}  # up to 2 to this power, grids of these types hold every whole number
 SMALLEST_VOLUME = 1e-14  # of a voxel; OpenVDB takes a matrix with a determinant of 3e-15 for singular
 UNITS = ["mm", "um", "nm", "angstrom"]
 SLAB_BYTES = 64 << 20
@@ -52,7 +52,7 @@ PROGRAM = Program(
      Option("stored", "", "the stored numbers, not the calibrated values"),
      Option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"),
             default="auto"),
-     Option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)"),
+     Option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)", length_unit),
      Option("voxel-size", "S|X,Y,Z", "edges of a voxel, instead of the transform of the image", three(float)),
      Option("nonfinite", "WORD", "NaN and infinite voxels: refuse, zero or missing (refuse)",
             ("refuse", "zero", "missing"), default="refuse"),
@@ -183,220 +183,196 @@ def channel_names(axis, selected, name):
 # -- lengths -------------------------------------------------------------------------------------------------------
 def transform_of(image, options):
     """The matrix, and the unit of its lengths (None if nothing says it)."""
-    matrix, unit = np.array(image.affine, float), image.unit
-    wanted = None
-    if options.unit:
-        wanted = unit_named(options.unit)
-        if wanted is None:
-            raise esvr.UsageError(f"--unit: '{options.unit}' is no unit of length; mm, um, nm, angstrom, m, ... are")
     if options.voxel_size:
-        return affine_of(options.voxel_size), wanted
+        return affine_of(options.voxel_size), options.unit
+    matrix, unit = np.array(image.affine, float), options.unit
     if not np.all(np.isfinite(matrix)):
         raise esvr.BadInput(f"{image.path}: the transform of the image is not finite (--voxel-size gives another)")
     volume = abs(np.linalg.det(matrix[:3, :3]))
     if volume == 0 or volume < 1e-12 * np.prod(np.linalg.norm(matrix[:3, :3], axis=0)):
         raise esvr.BadInput(f"{image.path}: the axes of the image are linearly dependent (--voxel-size gives others)")
-    if unit:
-        if wanted is None:
-            wanted = next((u for u in UNITS if volume * factor(unit, u) ** 3 >= SMALLEST_VOLUME), None)
-        if wanted is None:
-            raise esvr.BadInput(f"{image.path}: voxels are too small for OpenVDB (--voxel-size gives others)")
-        matrix[:3] *= factor(unit, wanted)
-        volume *= factor(unit, wanted) ** 3
-    if volume < SMALLEST_VOLUME:
-        raise esvr.BadInput(f"{image.path}: voxels of a volume of {volume:.3g} are too small for OpenVDB; --unit or "
-                            "--voxel-size gives other edges")
-    return matrix, wanted or unit
+    if image.unit:
+        unit = unit or next((u for u in UNITS if volume * factor(image.unit, u) ** 3 >= SMALLEST_VOLUME), UNITS[-1])
+        matrix[:3] *= factor(image.unit, unit)
+    if abs(np.linalg.det(matrix[:3, :3])) < SMALLEST_VOLUME:
+        raise esvr.BadInput(f"{image.path}: voxels of {', '.join(f'{n:.3g}' for n in np.linalg.norm(matrix[:3, :3], axis=0))} "
+                            f"{unit or '(no unit)'} are too small for OpenVDB; --unit or --voxel-size gives other edges")
+    return matrix, unit
 
 
 # -- voxels --------------------------------------------------------------------------------------------------------
 class Beyond(Exception):
-    """A whole number that a float does not hold."""
+    """A whole number that the grid does not hold."""
 
 
 class Missing(Exception):
     """The first missing voxel, from which on exactly those are inactive."""
 
 
-def grid_type(part, options):
-    """The type of the grid, and whether it is tried first whether floats hold all values."""
-    dtype = part.image.dtype
-    if part.is_vector:
-        if getattr(options, "as") not in ("auto", "float"):
-            raise esvr.UsageError("vectors become a grid of floats")
-        return "vec3s"
-    asked = getattr(options, "as")
-    if asked == "double":
-        if options.normalise:
+class Conversion:
+    """How a part of an image becomes a grid, and what was found in it: `missing` voxels, `nonfinite` ones that are now 0, and
+    whether values of float64 are rounded."""
+
+    def __init__(self, name, part, options, log):
+        self.name, self.part, self.image, self.options, self.log = name, part, part.image, options, log
+        self.kind, self.has_missing, self.is_rounded = self._type(), False, False
+        self.normal = self._largest() if options.normalise else None
+
+    def _type(self):
+        """The type of the grid. It is first tried whether floats hold all values."""
+        dtype, asked = self.image.dtype, getattr(self.options, "as")
+        is_whole = dtype.kind in "iub" and (self.options.stored or self.image.scale is None)
+        if self.part.is_vector:
+            if asked not in ("auto", "float"):
+                raise esvr.UsageError("vectors become a grid of floats")
+            return "vec3s"
+        if asked == "double" and self.options.normalise:
             raise esvr.UsageError("--normalise makes floats")
-        return "double"
-    if asked == "mask" or asked == "auto" and dtype.kind == "b":
-        return "bool"
-    whole = dtype.kind in "iub" and (options.stored or part.image.scale is None)
-    if asked == "integer":
-        if not whole:
-            raise esvr.UsageError(f"{part.image.path} has values of type {dtype.name}, which are no integers")
-        return "int32" if dtype.itemsize < 4 or dtype == np.int32 else "int64"
-    return "int64" if asked == "auto" and whole and dtype.kind in "iu" and dtype.itemsize == 8 else "float"
+        if asked == "integer" and not is_whole:
+            raise esvr.UsageError(f"{self.image.path} has values of type {dtype.name}, which are no integers")
+        if asked == "integer":
+            return "int32" if dtype.itemsize < 4 or dtype == np.int32 else "int64"
+        if asked == "mask" or asked == "auto" and dtype.kind == "b":
+            return "bool"
+        return "double" if asked == "double" else "int64" if asked == "auto" and is_whole and dtype.itemsize == 8 else "float"
 
+    def _slabs(self):
+        """The values slab by slab: the first slice, values, and missing voxels. A slab has a multiple of 8 slices, and keeps to the
+        memory."""
+        image, part, most = self.image, self.part, self.options.max_memory
+        brick_bytes = BRICK * np.prod(image.size, dtype=float) / part.slices * max(image.dtype.itemsize, 4) * 3
+        brick_bytes *= image.components if part.is_vector else 1
+        if brick_bytes > most:
+            raise esvr.MemoryExceeded(f"{image.path}: {BRICK} slices of the image ask for {brick_bytes:.3g} bytes of memory, and "
+                                      f"{most} are allowed")
+        fitting = int(min(SLAB_BYTES, most / 4) / brick_bytes)
+        step = BRICK * max(1, min(fitting, -(-image.block // BRICK) if image.block > 1 else 4))
+        for first in range(0, part.slices, step):
+            with reading(image.path, image.format):
+                values, gone = part.values(first, min(first + step, part.slices), self.options.stored)
+            yield first, values, gone
+            self.log.progress("reading", min(1.0, (first + step) / part.slices))
 
-def slab_slices(part, options):
-    """How many slices are read at once: a multiple of 8 that keeps to the memory."""
-    image = part.image
-    brick_bytes = BRICK * np.prod(image.size, dtype=float) / part.slices * max(image.dtype.itemsize, 4) * 3
-    brick_bytes *= image.components if part.is_vector else 1
-    if brick_bytes > options.max_memory:
-        raise esvr.MemoryExceeded(f"{image.path}: {BRICK} slices of the image ask for {brick_bytes:.3g} bytes of memory, and "
-                                  f"{options.max_memory} are allowed")
-    fitting = int(min(SLAB_BYTES, options.max_memory / 4) / brick_bytes)
-    return BRICK * max(1, min(fitting, -(-image.block // BRICK) if image.block > 1 else 4))
+    def _largest(self):
+        """By what --normalise divides: the largest value of a type of integers, or else that of the image."""
+        if self.image.dtype.kind in "iu" and self.image.scale is None:
+            return float(np.iinfo(self.image.dtype).max)
+        most = 0.0
+        for _, values, gone in self._slabs():
+            kept = np.isfinite(values) if gone is None else np.isfinite(values) & ~gone
+            most = max(most, float(np.abs(values[kept].astype(np.float64)).max(initial=0.0)))
+        if most == 0.0:
+            raise esvr.BadInput(f"{self.image.path}: every voxel is 0, so the image cannot be normalised")
+        return most
 
+    def grid(self):
+        image, kind, normal, options = self.image, self.kind, self.normal, self.options
+        self.missing = self.nonfinite = 0
+        matrix, unit = transform_of(image, options)
+        metadata = {"image_format": image.format, "image_size": tuple(image.size), "image_type": image.dtype.name, **image.metadata}
+        metadata.update({name: text for name, text in (("length_unit", unit), ("image_unit", image.unit)) if text})
+        threshold, by_builder = options.threshold, kind not in ("bool", "vec3s")
+        if self.has_missing and threshold is None and kind != "bool":
+            metadata["image_missing"] = True  # all inactive voxels are missing
 
-def slabs(part, options, log):
-    """The values of an image, slab by slab: the first slice, values, and missing voxels."""
-    step = slab_slices(part, options)
-    for first in range(0, part.slices, step):
-        with reading(part.image.path, part.image.format):
-            values, gone = part.values(first, min(first + step, part.slices), options.stored)
-        yield first, values, gone
-        log.progress("reading", min(1.0, (first + step) / part.slices))
+        def as_value(number):  # with the same rounding as voxels
+            return float(np.float32(number / normal)) if normal else number
+        builder = esvr.GridBuilder(kind, name=self.name, background=as_value(options.background) if by_builder else 0,
+                                   threshold=as_value(threshold) if threshold is not None and by_builder else None,
+                                   grid_class="fog volume" if kind == "float" else "unknown", transform=matrix, metadata=metadata,
+                                   max_bytes=options.max_memory)
+        for first, values, gone in self._slabs():
+            values, gone = self._converted(values, first, gone)
+            if gone is not None and gone.any():
+                if not self.has_missing:
+                    raise Missing
+                self.missing += int(gone.sum())
+            active = None
+            if self.has_missing or threshold is not None and not by_builder:
+                active = np.ones(values.shape[:3], bool) if gone is None else ~gone
+                if kind == "bool":
+                    active &= values
+                elif threshold is not None:
+                    active &= values >= threshold if values.ndim == 3 else np.linalg.norm(values, axis=3) >= threshold
+            if normal:
+                values = (values.astype(np.float64) / normal).astype(np.float32)
+            origin = [0, 0, 0]
+            origin[self.part.slab_axis] = first
+            builder.add(values, tuple(origin), active)
+        return builder.finish()
 
+    def _converted(self, values, first, gone):
+        """The values in a type that the builder takes, and which are missing (None if none is)."""
+        kind = self.kind
+        if values.dtype.kind == "f":
+            values, gone = self._finite(values, first, gone)
+        if kind == "bool":
+            return (values != 0 if self.options.threshold is None else values >= self.options.threshold), gone
+        is_integer = kind in ("int32", "int64")
+        if values.dtype == np.uint64 or values.dtype.kind in "iu" and values.dtype.itemsize > 2 and not is_integer:
+            inside = values if gone is None else values[~gone]
+            most = max((int(inside.min()), int(inside.max())), key=abs) if inside.size else 0
+            if abs(most) > 2 ** EXACT[kind] - is_integer:
+                raise Beyond(most)
+        if is_integer:
+            return values.astype(kind), gone
+        if kind == "vec3s" or values.dtype.kind == "b" or values.dtype.itemsize > 2:
+            values = values.astype(np.float64 if kind == "double" else np.float32, copy=False)
+        if kind == "vec3s" and self.image.turn is not None and not self.options.stored:
+            values = np.einsum("rc,xyzc->xyzr", self.image.turn, values.astype(np.float64)).astype(np.float32)
+        if not values.flags.aligned or not values.dtype.isnative:
+            values = values.astype(values.dtype.newbyteorder("="))
+        return values, gone
 
-def normal_of(part, options, log):
-    """By what --normalise divides: the largest value of a type of integers, or else that of the image."""
-    dtype, most = part.image.dtype, 0.0
-    if not options.normalise:
-        return None
-    if dtype.kind in "iu" and part.image.scale is None:
-        return float(np.iinfo(dtype).max)
-    for _, values, gone in slabs(part, options, log):
-        kept = np.isfinite(values) if gone is None else np.isfinite(values) & ~gone
-        most = max(most, float(np.abs(values[kept].astype(np.float64)).max(initial=0.0)))
-    if most == 0.0:
-        raise esvr.BadInput(f"{part.image.path}: every voxel is 0, so the image cannot be normalised")
-    return most
-
-
-class Tally:
-    missing = nonfinite = 0
-    is_rounded = False
+    def _finite(self, exact, first, gone):
+        """Floats of the type of the grid, without NaN and infinity, and which are missing."""
+        values = exact.astype(np.float64 if self.kind == "double" else np.float32, copy=False)
+        if self.image.scale is None and values.dtype.itemsize < exact.dtype.itemsize:
+            self.is_rounded = self.is_rounded or bool(np.any((values != exact) & np.isfinite(exact)))
+        good = np.isfinite(values)
+        if good.all():
+            return values, gone
+        bad = ~good if values.ndim == 3 else ~good.all(axis=3)
+        bad = bad if gone is None else bad & ~gone
+        if self.options.nonfinite == "refuse" and bad.any():
+            at = [int(n) for n in np.argwhere(bad)[0]]
+            at[self.part.slab_axis] += first
+            raise esvr.BadInput(f"{self.image.path}: the voxel {tuple(at)} is not finite (--nonfinite zero replaces such voxels by 0)")
+        if self.options.nonfinite == "missing":
+            gone = bad if gone is None else gone | bad
+        else:
+            self.nonfinite += int(bad.sum())
+        return np.where(good, values, values.dtype.type(0)), gone
 
 
 def convert(name, part, options, log):
-    """Makes the grid. Returns it with its tally and type.
+    """Makes the grid. Returns it with its conversion.
 
     Two things change the grid from the beginning, and are rare, so that the image is then read again: whole numbers that floats do
     not hold, and missing voxels, which make voxels of the background active.
     """
-    kind, normal, has_missing = grid_type(part, options), normal_of(part, options, log), False
+    conversion = Conversion(name, part, options, log)
     while True:
         try:
-            return pack(name, part, options, log, kind, normal, has_missing)
+            return conversion.grid(), conversion
         except Missing:
-            has_missing = True
+            conversion.has_missing = True
         except Beyond as beyond:
-            if getattr(options, "as") != "auto" or normal or part.is_vector:
-                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind].bit_length() - 1}, up to "
-                                    f"which a grid of type {kind} holds whole numbers; --as integer keeps it") from beyond
-            kind = "int32" if part.image.dtype == np.int32 and part.image.scale is None else "int64"
-
-
-def pack(name, part, options, log, kind, normal, has_missing):
-    image, tally = part.image, Tally()
-    matrix, unit = transform_of(image, options)
-    metadata = {"image_format": image.format, "image_size": tuple(image.size), "image_type": image.dtype.name, **image.metadata}
-    if unit:
-        metadata["length_unit"] = unit
-    if image.unit:
-        metadata["image_unit"] = image.unit
-    threshold = options.threshold
-
-    def as_value(number):  # with the same rounding as voxels
-        return float(np.float32(number / normal)) if normal else number
-    if has_missing and threshold is None and kind != "bool":
-        metadata["image_missing"] = True  # all inactive voxels are missing
-    by_builder = kind in ("float", "double", "int32", "int64")
-    builder = esvr.GridBuilder(kind, name=name, background=as_value(options.background) if by_builder else 0,
-                               threshold=as_value(threshold) if threshold is not None and by_builder else None,
-                               grid_class="fog volume" if kind == "float" else "unknown", transform=matrix, metadata=metadata,
-                               max_bytes=options.max_memory)
-    for first, values, gone in slabs(part, options, log):
-        values, gone = converted(values, kind, part, tally, first, gone, options)
-        if gone is not None and gone.any():
-            if not has_missing:
-                raise Missing
-            tally.missing += int(gone.sum())
-        active = None
-        if has_missing or threshold is not None and not by_builder:
-            active = np.ones(values.shape[:3], bool) if gone is None else ~gone
-            if threshold is not None and kind != "bool":
-                active &= values >= threshold if values.ndim == 3 else np.linalg.norm(values, axis=3) >= threshold
-            if kind == "bool":
-                active &= values
-        if normal:
-            values = (values.astype(np.float64) / normal).astype(np.float32)
-        origin = [0, 0, 0]
-        origin[part.slab_axis] = first
-        builder.add(values, tuple(origin), active)
-    return builder.finish(), tally, kind
-
-
-def converted(values, kind, part, tally, first, gone, options):
-    """The values in a type that the builder takes, and which are missing (None if none is)."""
-    if values.dtype.kind == "f":
-        values, gone = finite(values, kind, part, tally, first, gone, options)
-    if kind == "bool":
-        return (values != 0 if options.threshold is None else values >= options.threshold), gone
-    if kind in ("int32", "int64"):
-        inside = values if gone is None else values[~gone]
-        if values.dtype == np.uint64 and inside.size and int(inside.max()) > 2 ** 63 - 1:
-            raise esvr.BadInput(f"{part.image.path}: the value {inside.max()} is beyond 2^63 - 1, the largest that an Int64 grid "
-                                "holds")
-        return values.astype(kind), gone
-    if values.dtype.kind in "iu" and values.dtype.itemsize > 2:
-        inside = values if gone is None else values[~gone]
-        most = max((int(inside.min()), int(inside.max())), key=abs) if inside.size else 0
-        if abs(most) > EXACT[kind]:
-            raise Beyond(most)
-    if kind == "vec3s" or values.dtype.kind == "b" or values.dtype.itemsize > 2:
-        values = values.astype(np.float64 if kind == "double" else np.float32, copy=False)
-    if kind == "vec3s" and part.image.turn is not None and not options.stored:
-        values = np.einsum("rc,xyzc->xyzr", part.image.turn, values.astype(np.float64)).astype(np.float32)
-    if not values.flags.aligned or not values.dtype.isnative:
-        values = values.astype(values.dtype.newbyteorder("="))
-    return values, gone
-
-
-def finite(values, kind, part, tally, first, gone, options):
-    """Floats of the type of the grid, without NaN and infinity, and which are missing."""
-    exact, values = values, values.astype(np.float64 if kind == "double" else np.float32, copy=False)
-    if part.image.scale is None and values.dtype.itemsize < exact.dtype.itemsize:
-        tally.is_rounded = tally.is_rounded or bool(np.any((values != exact) & np.isfinite(exact)))
-    good = np.isfinite(values)
-    if good.all():
-        return values, gone
-    bad = ~good if gone is None else ~(good | (gone if values.ndim == 3 else gone[..., np.newaxis]))
-    bad = bad.any(axis=3) if values.ndim == 4 else bad
-    if options.nonfinite == "refuse" and bad.any():
-        at = [int(n) for n in np.argwhere(bad)[0]]
-        at[part.slab_axis] += first
-        raise esvr.BadInput(f"{part.image.path}: the voxel {tuple(at)} is not finite (--nonfinite zero replaces such voxels by 0)")
-    if options.nonfinite == "missing":
-        gone = bad if gone is None else gone | bad
-    else:
-        tally.nonfinite += int(bad.sum())
-    return np.where(good, values, values.dtype.type(0)), gone
+            kind = conversion.kind
+            if getattr(options, "as") != "auto" or conversion.normal or kind in ("vec3s", "int64"):
+                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind]}, up to which a grid of type {kind} "
+                                    f"holds whole numbers{'' if kind == 'int64' else '; --as integer keeps it'}") from beyond
+            conversion.kind = "int32" if part.image.dtype == np.int32 and part.image.scale is None else "int64"
 
 
 # -- the program ---------------------------------------------------------------------------------------------------
-def summary(out, grid, kind, tally):
-    box = grid.box
-    where = f"from {tuple(box[0])} to {tuple(box[1])}" if box else "(the grid is empty)"
+def summary(out, grid, conversion):
+    where = f"from {tuple(grid.box[0])} to {tuple(grid.box[1])}" if grid.box else "(the grid is empty)"
     lengths = ", ".join(f"{length:.6g}" for length in np.linalg.norm(grid.transform[:3, :3], axis=0))
-    unit = grid.metadata.get("length_unit")
-    text = f"{out}: {grid.name}, {kind}, {grid.active_voxels} active voxels {where}, voxels of {lengths} {unit or '(no unit)'}"
-    return text + (f"; {tally.missing} voxels are missing" if tally.missing else "") + (
-        "; values of float64 are rounded to float32 (--as double keeps them)" if tally.is_rounded else "")
+    text = f"{out}: {grid.name}, {conversion.kind}, {grid.active_voxels} active voxels {where}, voxels of {lengths} " + (
+        grid.metadata.get("length_unit") or "(no unit)")
+    return text + (f"; {conversion.missing} voxels are missing" if conversion.missing else "") + (
+        "; values of float64 are rounded to float32 (--as double keeps them)" if conversion.is_rounded else "")
 
 
 def work(arguments):
@@ -420,12 +396,12 @@ def work(arguments):
             path = program.frame_path(out, time) if is_sequence else out
             program.check_output(path, (".vdb", ".nvdb"), arguments.force, inputs)
             made = [convert(name, part, arguments, log) for name, part in parts]
-            nonfinite = sum(tally.nonfinite for _, tally, _ in made)
+            nonfinite = sum(conversion.nonfinite for _, conversion in made)
             if nonfinite:
                 log.warning(f"{nonfinite} voxels were not finite and are now 0")
-            esvr.write_vdb(path, [grid for grid, _, _ in made], metadata={"creator": PROGRAM.name}, overwrite=arguments.force)
-            for grid, tally, kind in made:
-                log.info(summary(path, grid, kind, tally))
+            esvr.write_vdb(path, [grid for grid, _ in made], metadata={"creator": PROGRAM.name}, overwrite=arguments.force)
+            for grid, conversion in made:
+                log.info(summary(path, grid, conversion))
 
     return program.run_in_child(PROGRAM.name, inputs, [out], make, arguments.verbose)
 

@@ -20,6 +20,8 @@ from dataclasses import dataclass
 
 import esvr
 
+from .image import unit_named
+
 WIDTH = 100  # columns of --help
 PATIENCE_S = 1  # after an interruption; then a library that does not return is ended
 CRASHES = {signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL}
@@ -59,19 +61,13 @@ class Program:
 
     # -- help ------------------------------------------------------------------------------------------------------
     def help(self):
-        def rows(options):
-            titles = [option.title() for option in options]
-            wide = max(len(title) for title in titles) + 4
-            lines = []
-            for title, option in zip(titles, options):
-                text = textwrap.wrap(option.text, WIDTH - wide)
-                lines += [f"  {title:{wide - 2}}{text[0]}"] + [" " * wide + more for more in text[1:]]
-            return lines
-
+        wide = max(len(option.title()) for option in self.options) + 4
+        rows = [textwrap.fill(option.text, WIDTH, initial_indent=f"  {option.title():{wide - 2}}", subsequent_indent=" " * wide)
+                for option in self.options]
         short = ", ".join(f"-{o.short}" if o.short else f"--{o.name}" for o in COMMON)
         notes = "\n".join(textwrap.fill(line, WIDTH) for line in self.notes.splitlines())
         return "\n".join([textwrap.fill(self.purpose, WIDTH), "", "Usage:", self.usage, "", "Options:",
-                          *rows(self.options), f"  common to all programs: {short} "
+                          *rows, f"  common to all programs: {short} "
                           "(--quiet, --verbose, --help)", "", "Notes:", notes, "", "Examples:", self.examples]) + "\n"
 
     def man_page(self):
@@ -155,6 +151,13 @@ def byte_size(text):
 
 
 byte_size.__name__ = "size"
+
+
+def length_unit(text):
+    unit = unit_named(text)
+    if unit is None:
+        raise argparse.ArgumentTypeError(f"'{text}' is no unit of length; mm, um, nm, angstrom, m, ... are")
+    return unit
 
 
 def readers_text():
