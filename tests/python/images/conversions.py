@@ -73,7 +73,7 @@ class Quiet:
 
 def convert_all(*words):
     """All grids of an image, time after time."""
-    arguments = image2vdb.PROGRAM.parse([str(word) for word in words] + ["out.vdb"])
+    arguments = image2vdb.PARSER.parse([str(word) for word in words] + ["out.vdb"])
     image = image2vdb.open_image(arguments.files[:-1], arguments)
     made = []
     for _, parts in image2vdb.chosen_parts(image, arguments):

@@ -9,7 +9,7 @@ import esvr
 
 from . import program, read_dicom, read_nrrd, read_science, read_tiff, read_volumes
 from .image import BRICK, TIME, VECTOR, Part, affine_of, factor, head_of, natural, reading
-from .program import Option, Program, byte_size, length_unit, number
+from .program import Parser, byte_size, count, length_unit, number, option
 
 EXACT = {"float": 24, "vec3s": 24, "double": 53, "int64": 63}  # up to 2 to this power, grids of these types hold every whole number
 SMALLEST_VOLUME = 1e-14  # of a voxel; OpenVDB takes a matrix with a determinant of 3e-15 for singular
@@ -17,52 +17,43 @@ UNITS = ["mm", "um", "nm", "angstrom"]
 SLAB_BYTES = 64 << 20
 
 
-def three(kind):
-    def parse(text):
-        words = text.split(",")
-        values = [kind(word) for word in words]
-        if len(values) not in ((1, 3) if kind is float else (3,)) or any(not value > 0 for value in values):
-            raise argparse.ArgumentTypeError(f"'{text}' is not {'one or ' if kind is float else ''}three numbers above 0")
+def three(kind, counts):
+    def numbers(text):
+        values = [kind(word) for word in text.split(",")]
+        if len(values) not in counts or any(not value > 0 for value in values):
+            raise argparse.ArgumentTypeError(f"'{text}' is not {' or '.join(map(str, counts))} numbers above 0")
         return values * 3 if len(values) == 1 else values
-    parse.__name__ = "list"
-    return parse
-
-
-def count(text):
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"'{text}' is below 0")
-    return value
+    return numbers
 
 
 def place(text):
-    return text if text == "all" else count(text)
+    return text if text == "all" else count()(text)
 
 
-PROGRAM = Program(
+PARSER = Parser(
     "image2vdb", "Converts an image of voxels to sparse VDB grids.",
     "  image2vdb IN... OUT.vdb [options]     IN: an image, slices in order, a folder or 'ct_####.tif'",
-    [Option("name", "NAME", "name of the grid (density)", default="density"),
-     Option("threshold", "T", "smallest value of active voxels", number),
-     Option("background", "B", "value of inactive voxels (0); without --threshold, other values are active", number, default=0.0),
-     Option("channel", "K|all", "which of several channels, colors or components, from 0 on; all: a grid for each", place),
-     Option("time", "K|all", "which of several times, from 0 on; all: a file for each, as OUT.####.vdb", place),
-     Option("dataset", "NAME", "HDF5, netCDF, Zarr, VTI: the array; DICOM: the series; OME-TIFF: the image"),
-     Option("axes", "LETTERS", "what the axes are, the slowest first: tczyx; v for components of vectors"),
-     Option("stored", "", "the stored numbers, not the calibrated values"),
-     Option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"),
+    [option("name", "NAME", "name of the grid (density)", default="density"),
+     option("threshold", "T", "smallest value of active voxels", number),
+     option("background", "B", "value of inactive voxels (0); without --threshold, other values are active", number, default=0.0),
+     option("channel", "K|all", "which of several channels, colors or components, from 0 on; all: a grid for each", place),
+     option("time", "K|all", "which of several times, from 0 on; all: a file for each, as OUT.####.vdb", place),
+     option("dataset", "NAME", "HDF5, netCDF, Zarr, VTI: the array; DICOM: the series; OME-TIFF: the image"),
+     option("axes", "LETTERS", "what the axes are, the slowest first: tczyx; v for components of vectors"),
+     option("stored", "", "the stored numbers, not the calibrated values"),
+     option("as", "TYPE", "auto, float, double, integer or mask (auto)", ("auto", "float", "double", "integer", "mask"),
             default="auto"),
-     Option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)", length_unit),
-     Option("voxel-size", "S|X,Y,Z", "edges of a voxel, instead of the transform of the image", three(float)),
-     Option("nonfinite", "WORD", "NaN and infinite voxels: refuse, zero or missing (refuse)",
+     option("unit", "UNIT", "unit of lengths (mm; where voxels are too small for OpenVDB, a smaller one)", length_unit),
+     option("voxel-size", "S|X,Y,Z", "edges of a voxel, instead of the transform of the image", three(float, (1, 3))),
+     option("nonfinite", "WORD", "NaN and infinite voxels: refuse, zero or missing (refuse)",
             ("refuse", "zero", "missing"), default="refuse"),
-     Option("normalise", "", "divide by the type's largest value, or by the largest of a float image"),
-     Option("dims", "X,Y,Z", "RAW: number of voxels along each axis", three(int)),
-     Option("type", "TYPE", "RAW: uint8, int16, float32, ..."),
-     Option("endian", "little|big", "RAW: byte order (little)", ("little", "big"), default="little"),
-     Option("skip", "BYTES", "RAW: length of a header (0)", count, default=0),
-     Option("max-memory", "SIZE", "limit on the memory of the image and of the grid (4G)", byte_size, default=4 * 10 ** 9),
-     Option("force", "", "replace OUT.vdb if it exists", short="f")],
+     option("normalise", "", "divide by the type's largest value, or by the largest of a float image"),
+     option("dims", "X,Y,Z", "RAW: number of voxels along each axis", three(int, (3,))),
+     option("type", "TYPE", "RAW: uint8, int16, float32, ..."),
+     option("endian", "little|big", "RAW: byte order (little)", ("little", "big"), default="little"),
+     option("skip", "BYTES", "RAW: length of a header (0)", count(), default=0),
+     option("max-memory", "SIZE", "limit on the memory of the image and of the grid (4G)", byte_size, default=4 * 10 ** 9),
+     option("force", "", "replace OUT.vdb if it exists", short="f")],
     "TIFF, NIfTI, DICOM, NRRD, MetaImage, MRC, VTI, HDF5, netCDF, Zarr, NPY and RAW are read. Values are calibrated, missing "
     "voxels are inactive, lengths are millimetres, and patients are RAS. vdb2image is the way back.",
     "  image2vdb cells.ome.tif cells.vdb --unit um --channel 0\n  image2vdb brain.nii.gz brain.vdb --threshold 40\n"
@@ -150,18 +141,18 @@ def chosen_parts(image, options):
                               f"{'; '.join(axis.text() for axis in others)}; this is not read")
     channels, times = others[0] if others else image.axis(VECTOR), image.axis(TIME)
     places, unsaid = {axis.kind: [0] for axis in image.choices()}, []
-    for axis, asked, option in ((channels, options.channel, "--channel"), (times, options.time, "--time")):
+    for axis, asked, flag in ((channels, options.channel, "--channel"), (times, options.time, "--time")):
         size = axis.size if axis else 1
         if asked is None:
             if size > 1 and axis.kind != VECTOR:
-                unsaid.append((axis, option))
+                unsaid.append((axis, flag))
         elif asked != "all" and asked >= size:
-            raise esvr.UsageError(f"{option} must be 0 to {size - 1}: {image.path} has {axis.text() if axis else 'only one'}")
+            raise esvr.UsageError(f"{flag} must be 0 to {size - 1}: {image.path} has {axis.text() if axis else 'only one'}")
         elif axis:
             places[axis.kind] = range(size) if asked == "all" else [asked]
     if unsaid:
         raise esvr.UsageError(f"{image.path} has several images: {'; '.join(axis.text() for axis, _ in unsaid)}; choose by "
-                              + " and ".join(f"{option} K or {option} all" for _, option in unsaid))
+                              + " and ".join(f"{flag} K or {flag} all" for _, flag in unsaid))
     if image.components not in (1, 3) and VECTOR not in places:
         raise esvr.UsageError(f"{image.path} has vectors of {image.components} components; choose by --channel")
     selected = places.pop(channels.kind, [None]) if channels else [None]
@@ -384,7 +375,7 @@ def work(arguments):
         raise esvr.UsageError("--time all writes a file for each time, whose name must have a place for its number, as "
                               f"OUT.####.vdb, and {out} has none")
     program.check_output(program.frame_path(out, 0) if is_sequence else out, (".vdb", ".nvdb"), arguments.force, inputs)
-    log = program.Log(PROGRAM.name, arguments)
+    log = program.Log(PARSER.prog, arguments)
 
     def make():
         image = open_image(inputs, arguments)
@@ -399,15 +390,15 @@ def work(arguments):
             nonfinite = sum(conversion.nonfinite for _, conversion in made)
             if nonfinite:
                 log.warning(f"{nonfinite} voxels were not finite and are now 0")
-            esvr.write_vdb(path, [grid for grid, _ in made], metadata={"creator": PROGRAM.name}, overwrite=arguments.force)
+            esvr.write_vdb(path, [grid for grid, _ in made], metadata={"creator": PARSER.prog}, overwrite=arguments.force)
             for grid, conversion in made:
                 log.info(summary(path, grid, conversion))
 
-    return program.run_in_child(PROGRAM.name, inputs, [out], make, arguments.verbose)
+    return program.run_in_child(PARSER.prog, inputs, [out], make, arguments.verbose)
 
 
 def main():
-    return program.main(PROGRAM, work)
+    return program.main(PARSER, work)
 
 
 if __name__ == "__main__":

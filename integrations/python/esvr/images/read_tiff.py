@@ -8,8 +8,8 @@ import numpy as np
 
 import esvr
 
-from .image import (CHANNEL, TIME, Axis, Image, affine_of, affine_of_steps, axes_from_letters, by, factor, kind_named, mapped,
-                    missing_if_any, natural, need, planes, product, reading, require_bytes, unit_named)
+from .image import (CHANNEL, SPACE, TIME, Axis, Image, affine_of_steps, axes_from_letters, by, kind_named, mapped, missing_if_any,
+                    natural, need, planes, product, reading, require_bytes, unit_named)
 from .program import number_mark
 
 TIFF_AXES = {"X": "x", "Y": "y", "Z": "z", "C": CHANNEL, "S": "sample", "T": TIME, "Q": "page", "I": "page"}
@@ -99,17 +99,18 @@ def read_tiff(path, options):
         letters = letters.replace("Q" if "Q" in letters else "I", "Z", 1)
     axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
         Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
-    # What descriptions say of lengths and values. A distance of slices that is not known is None.
-    space = SimpleNamespace(spacing=[1.0, 1.0, 1.0], origin=[0.0, 0.0, 0.0], unit=None, scale=None, labels=[], warnings=[])
-    describe(path, file, file.pages.first, space, number, options)
-    if space.spacing[2] is None:
-        space.spacing[2] = space.spacing[0]
+    # What descriptions say of lengths (the step, the first place and the unit of x, y, z) and values. A step that is not known is None.
+    said = SimpleNamespace(steps=[[1.0, 0.0, None] for _ in SPACE], scale=None, labels=[], warnings=[])
+    describe(path, file, file.pages.first, said, number, options)
+    if said.steps[2][0] is None:
+        said.steps[2] = [said.steps[0][0], 0.0, said.steps[0][2]]
         if any(axis.kind == "z" and axis.size > 1 for axis in axes):
-            space.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
+            said.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
+    affine, unit = affine_of_steps([Axis(kind, 1) for kind in SPACE], said.steps)
     nodata = page.tags.get("GDAL_NODATA")
-    image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine_of(space.spacing, space.origin),
-                  space.unit, space.scale, missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=space.warnings)
-    image.name_channels(space.labels)
+    image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine, unit, said.scale,
+                  missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=said.warnings)
+    image.name_channels(said.labels)
     file.filehandle.close()  # a process may open some 1,000 files, and a stack may have more
     return image
 
@@ -238,36 +239,31 @@ def imagej_axes(file, letters):
     return letters if is_time else letters.replace("T", "Z")
 
 
-def describe(path, file, page, space, number, options):
+def describe(path, file, page, said, number, options):
     if file.is_ome:
-        describe_ome(ome_pixels(file), number, space)
-    elif is_scifio(file):
-        describe_scifio(page.description, space)
-    elif file.is_imagej:
-        describe_resolution(page, space)
-        describe_imagej(path, page.description, space, options)
-    elif file.is_lsm:
-        space.spacing = [abs(float(file.lsm_metadata[f"VoxelSize{axis}"])) or 1.0 for axis in "XYZ"]
-        space.unit = "m"
-    else:
-        describe_resolution(page, space)
-        code = page.tags.get("ResolutionUnit")
-        unit = RESOLUTION_UNITS.get(int(code.value)) if code else None
-        if unit and page.tags.get("XResolution"):
-            space.unit, space.spacing[2] = unit, None
-        else:  # without a unit, resolutions say the ratio of the edges only
-            space.spacing = [1.0, space.spacing[1] / space.spacing[0], 1.0]
-        if page.tags.get("ModelPixelScaleTag"):
-            space.warnings.append("the place on the earth is not read")
-        if page.tags.get("GDAL_METADATA"):
-            describe_gdal(path, str(page.tags["GDAL_METADATA"].value), space)
-
-
-def describe_resolution(page, space):
-    for axis, tag in enumerate(("XResolution", "YResolution")):
+        return describe_ome(ome_pixels(file), number, said)
+    if is_scifio(file):
+        return describe_scifio(page.description, said)
+    if file.is_lsm:
+        said.steps = [[abs(float(file.lsm_metadata[f"VoxelSize{axis}"])) or 1.0, 0.0, "m"] for axis in "XYZ"]
+        return None
+    for step, tag in zip(said.steps, ("XResolution", "YResolution")):
         value = page.tags.get(tag)
         if value and value.value[0] and value.value[1]:
-            space.spacing[axis] = value.value[1] / value.value[0]
+            step[0] = value.value[1] / value.value[0]
+    if file.is_imagej:
+        return describe_imagej(path, page.description, said, options)
+    code = page.tags.get("ResolutionUnit")
+    unit = RESOLUTION_UNITS.get(int(code.value)) if code else None
+    if unit and page.tags.get("XResolution"):
+        said.steps = [[said.steps[0][0], 0.0, unit], [said.steps[1][0], 0.0, unit], [None, 0.0, unit]]
+    else:  # without a unit, resolutions say the ratio of the edges only
+        said.steps[0][0], said.steps[1][0] = 1.0, said.steps[1][0] / said.steps[0][0]
+    if page.tags.get("ModelPixelScaleTag"):
+        said.warnings.append("the place on the earth is not read")
+    if page.tags.get("GDAL_METADATA"):
+        describe_gdal(path, str(page.tags["GDAL_METADATA"].value), said)
+    return None
 
 
 def lines_of(description):
@@ -276,39 +272,34 @@ def lines_of(description):
     return {key.strip(): value.strip() for key, separator, value in pairs if separator}
 
 
-def describe_imagej(path, description, space, options):
-    said = lines_of(description)
-    space.unit = unit_named(said.get("unit", ""))
-    space.spacing[2] = abs(float(said.get("spacing", 1.0))) or 1.0
-    for column, name in ((1, "yunit"), (2, "zunit")):  # only where they are not that of x
-        if name in said and unit_named(said[name]) != space.unit:
-            if not space.unit or not unit_named(said[name]):
-                raise esvr.BadInput(f"{path} has edges in '{said.get('unit', '')}' and '{said[name]}', of which one is no unit of length")
-            space.spacing[column] *= factor(unit_named(said[name]), space.unit)
-    # The origin of ImageJ is the place of the zero point, counted in voxels.
-    space.origin = [-float(said.get(f"{axis}origin", 0.0)) * step for axis, step in zip("xyz", space.spacing)]
-    calibration = said.get("cf", "20")
-    if calibration == "0" and "c0" in said and "c1" in said:
-        space.scale = (float(said["c1"]), float(said["c0"]))
+def describe_imagej(path, description, said, options):
+    lines = lines_of(description)
+    said.steps[2][0] = abs(float(lines.get("spacing", 1.0))) or 1.0
+    for step, axis in zip(said.steps, SPACE):
+        # The origin of ImageJ is the place of the zero point, counted in voxels; units of y and z are there if they are not that of x.
+        step[1:] = -float(lines.get(f"{axis}origin", 0.0)) * step[0], lines.get(f"{axis}unit", lines.get("unit", ""))
+    units = [unit_named(unit) for _, _, unit in said.steps]
+    if None in units and any(units):
+        raise esvr.BadInput(f"{path} has edges in '{', '.join(unit for _, _, unit in said.steps)}', of which one is no unit of length")
+    calibration = lines.get("cf", "20")
+    if calibration == "0" and "c0" in lines and "c1" in lines:
+        said.scale = (float(lines["c1"]), float(lines["c0"]))
     elif calibration not in ("0", "20") and not options.stored:
         raise esvr.BadInput(f"{path}: the values have a calibration of ImageJ that is no line (cf={calibration}), which is not read; "
                             "--stored takes the stored numbers")
 
 
-def describe_scifio(description, space):
-    said = lines_of(description)
-    names = [name.strip().lower() for name in said["axes"].split(",")]
-    scales, units = said.get("scales", "").split(","), said.get("units", "").split(",")
-    if len(scales) != len(names):
-        return
-    axes = [Axis(kind_named(name), 1) for name in names]
-    numbers = [abs(float(scale)) or 1.0 if scale.strip() not in ("", "null") else 1.0 for scale in scales]
-    units = units if len(units) == len(names) else [None] * len(names)
-    matrix, space.unit = affine_of_steps(axes, [(step, 0.0, unit) for step, unit in zip(numbers, units)])
-    space.spacing = list(np.diag(matrix)[:3])
+def describe_scifio(description, said):
+    lines = lines_of(description)
+    names, scales, units = ([text.strip() for text in lines.get(key, "").split(",")] for key in ("axes", "scales", "units"))
+    if len(scales) == len(names):
+        units = units if len(units) == len(names) else [None] * len(names)
+        steps = {kind_named(name): [abs(float(scale)) or 1.0 if scale not in ("", "null") else 1.0, 0.0, unit]
+                 for name, scale, unit in zip(names, scales, units)}
+        said.steps = [steps.get(kind, [1.0, 0.0, units[0]]) for kind in SPACE]
 
 
-def describe_gdal(path, text, space):
+def describe_gdal(path, text, said):
     """The calibration of GDAL, which must be the same in all bands."""
     found = {}
     for item in tree.fromstring(text.strip("\0 ")).iter("Item"):
@@ -317,7 +308,7 @@ def describe_gdal(path, text, space):
     if any(len(numbers) > 1 for numbers in found.values()):
         raise esvr.BadInput(f"{path} has bands of different calibrations, which are not read")
     if found:
-        space.scale = (*found.get("scale", {1.0}), *found.get("offset", {0.0}))
+        said.scale = (*found.get("scale", {1.0}), *found.get("offset", {0.0}))
 
 
 def local_name(element):
@@ -329,15 +320,10 @@ def ome_pixels(file):
     return [e for e in tree.fromstring(file.ome_metadata).iter() if local_name(e) == "Pixels"]
 
 
-def describe_ome(images, number, space):
+def describe_ome(images, number, said):
     pixels = images[min(number, len(images) - 1)]
-    space.labels = [e.get("Name") or "" for e in pixels if local_name(e) == "Channel"]
-    sizes = [abs(float(pixels.get(f"PhysicalSize{axis}") or 0.0)) for axis in "XYZ"]
-    units = [unit_named(pixels.get(f"PhysicalSize{axis}Unit", "um")) for axis in "XYZ"]
-    if not any(sizes):
-        return
-    if all(unit for size, unit in zip(sizes, units) if size):
-        space.unit = "um"
-        sizes = [size * factor(unit, "um") if size else 0.0 for size, unit in zip(sizes, units)]
-    known = next(size for size in sizes if size)
-    space.spacing = [size or known for size in sizes[:2]] + [sizes[2] or None]
+    said.labels = [e.get("Name") or "" for e in pixels if local_name(e) == "Channel"]
+    steps = [[abs(float(pixels.get(f"PhysicalSize{axis}") or 0.0)), 0.0, pixels.get(f"PhysicalSize{axis}Unit", "um")] for axis in "XYZ"]
+    known = next((step for step in steps if step[0]), None)
+    if known:
+        said.steps = [step if step[0] else list(known) for step in steps[:2]] + [steps[2] if steps[2][0] else [None, 0.0, None]]

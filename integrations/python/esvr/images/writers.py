@@ -145,8 +145,8 @@ def write_mrc(path, volume):
         header = file.header
         header.cellb.alpha, header.cellb.beta, header.cellb.gamma = angles
         header.origin.x, header.origin.y, header.origin.z = matrix[:3, 3]
-        facts = volume.facts
-        header.dmin, header.dmax, header.dmean, header.rms = facts.low, facts.high, facts.mean, facts.deviation
+        header.dmin, header.dmax = (volume.low, volume.high) if volume.low is not None else (0, 0)
+        header.dmean, header.rms = header.dmin - 1, -1  # which means that they are not known
 
 
 def write_netcdf(path, volume):
