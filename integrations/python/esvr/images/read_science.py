@@ -27,8 +27,8 @@ def choose(path, found, dataset, what):
     return next(iter(found))
 
 
-def text_of(name, shape, dtype):
-    return f"{name} ({' x '.join(map(str, shape))} {dtype})"
+def text_of(name, array):
+    return f"{name} ({' x '.join(map(str, array.shape))} {getattr(array.dtype, 'name', array.dtype)})"
 
 
 def is_real(dtype):
@@ -94,9 +94,24 @@ def step_of(numbers, attributes, name, warnings):
     return step, float(places[0]), str(attributes.get("units", ""))
 
 
+def candidates(arrays, attributes, is_coordinate, dataset):
+    """The texts of the arrays of which one may be the image, by their names: those of real numbers that are no coordinates and do
+    not describe others, with three axes, or with two if none has three. --dataset may name any array."""
+    texts = {name: text_of(name, array) for name, array in arrays.items()}
+    if dataset is not None:
+        return texts
+    described = {word for these in attributes.values() for name in ("bounds", "coordinates", "grid_mapping")
+                 for word in str(these.get(name, "")).split()}
+    found = {name: array.ndim for name, array in arrays.items() if is_real(array.dtype) and array.ndim >= 2 and array.size and
+             not is_coordinate(name, array) and name.rpartition("/")[2] not in described}
+    return {name: texts[name] for name, count in found.items() if count >= min(3, max(found.values()))}
+
+
 def described_image(format_name, path, names, coordinates, array, attributes, options, block=1):
     """The image of an array whose axes have names ("" where the file does not say) and coordinates (numbers and attributes, or
     None), and whose numbers are packed and missing as the CF conventions say."""
+    if not is_real(array.dtype):
+        raise esvr.BadInput(f"{path}: the array holds {array.dtype}, and images hold real numbers")
     dtype, warnings = np.dtype(array.dtype), []
     axes = named_axes(path, names, [c[1] if c else {} for c in coordinates], array.shape, options) if all(names) else \
         unnamed_axes(path, array.shape, options)
@@ -152,33 +167,20 @@ def coordinates_of(scale):
 
 
 # -- HDF5 ----------------------------------------------------------------------------------------------------------
-def hdf5_arrays(h5py, file):
-    found = {}
-
-    def visit(name, item):
-        if isinstance(item, h5py.Dataset) and item.ndim >= 3 and item.size:
-            found[f"/{name}"] = item
-    file.visititems(visit)
-    return found
-
-
 # Formats within HDF5 whose numbers are not values, or whose arrays are larger than the image, by one of their groups.
 HDF5_OTHERS = {"minc-2.0": "MINC", "DataSetInfo": "Imaris", "__DATA_TYPES__": "BigDataViewer", "ITKImage": "ITK"}
 
 
-def read_hdf5(path, options):
-    h5py = need("h5py", "python3-h5py", path, "HDF5")
-    file = h5py.File(path, "r")
+def read_hdf5(path, options, format_name="HDF5"):
+    h5py = need("h5py", "python3-h5py", path, format_name)
+    file, arrays = h5py.File(path, "r"), {}
     for name, program in HDF5_OTHERS.items():
         if name in file:
             raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or OME-TIFF")
-    found = {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items() if is_real(item.dtype)}
-    if options.dataset and isinstance(file.get(options.dataset), h5py.Dataset):
-        found.setdefault("/" + options.dataset.strip("/"), "")
+    file.visititems(lambda name, item: arrays.update({f"/{name}": item} if isinstance(item, h5py.Dataset) else {}))
+    found = candidates(arrays, {name: plain(item.attrs) for name, item in arrays.items()}, lambda _, item: h5py.h5ds.is_scale(item.id), options.dataset)
     name = choose(path, found, options.dataset, "dataset")
-    dataset = file[name]
-    if not is_real(dataset.dtype):
-        raise esvr.BadInput(f"{path}: the dataset {name} holds {dataset.dtype}, and images hold real numbers")
+    dataset = arrays[name]
     if dataset.chunks is None and dataset.id.get_offset() is not None:
         require_bytes(path, product(dataset.shape) * dataset.dtype.itemsize, os.path.getsize(path) - dataset.id.get_offset(),
                       f"the dataset {name}")
@@ -187,7 +189,7 @@ def read_hdf5(path, options):
     attributes = plain(dataset.attrs)
     if "axistags" in attributes and not all(names):  # of vigra and ilastik
         names = [tag["key"] for tag in json.loads(attributes["axistags"])["axes"]]
-    image = described_image("HDF5", path, names, [coordinates_of(scale) for scale in scales], dataset, attributes, options,
+    image = described_image(format_name, path, names, [coordinates_of(scale) for scale in scales], dataset, attributes, options,
                             dataset.chunks[0] if dataset.chunks else 1)
     sizes = attributes.get("element_size_um")
     if np.size(sizes) == 3:
@@ -197,55 +199,21 @@ def read_hdf5(path, options):
 
 # -- netCDF --------------------------------------------------------------------------------------------------------
 def read_netcdf(path, options):
+    """The classic format; netCDF 4 is HDF5, of which the netCDF library leaves out what its model does not have."""
+    with open(path, "rb") as file:
+        if file.read(3) != b"CDF":
+            return read_hdf5(path, options, "netCDF")
     netcdf = need("netCDF4", "python3-netcdf4", path, "netCDF")
     file = netcdf.Dataset(path)
     file.set_auto_maskandscale(False)
-    variables, known = {}, set()
-    for prefix, group in netcdf_groups(file, "/"):
-        known |= {prefix + name for name in group.variables}
-        described = {other for v in group.variables.values() for name in ("bounds", "coordinates", "grid_mapping")
-                     if name in v.ncattrs() for other in str(v.getncattr(name)).split()}
-        variables.update({prefix + name: v for name, v in group.variables.items() if is_real(v.dtype) and
-                          name not in v.dimensions and name not in described and v.ndim >= 2})
-    deepest = max([v.ndim for v in variables.values()], default=0)
-    found = {name: text_of(name, v.shape, v.dtype) for name, v in variables.items() if v.ndim >= min(deepest, 3)}
-    if options.dataset:
-        found.update({name: name for name in variables if name == "/" + options.dataset.strip("/")})
-    left_out = netcdf_left_out(path, known)
-    name = choose(path, {**found, **left_out}, options.dataset, "variable")
-    if name in left_out:
-        file.close()
-        options.dataset = name
-        return read_hdf5(path, options)
     check_classic(path)
-    variable, coordinates = file[name], []
-    for dim in variable.get_dims():
-        scale = dim.group().variables.get(dim.name)
-        fits = scale is not None and scale.ndim == 1 and is_real(scale.dtype) and scale is not variable
-        coordinates.append((scale[:], plain(scale.__dict__)) if fits else None)
-    chunks = variable.chunking()
-    return described_image("netCDF", path, variable.dimensions, coordinates, variable, plain(variable.__dict__), options,
-                           chunks[0] if isinstance(chunks, list) else 1)
-
-
-def netcdf_groups(group, prefix):
-    """The groups of a file with their names."""
-    yield prefix, group
-    for name, child in group.groups.items():
-        yield from netcdf_groups(child, f"{prefix}{name}/")
-
-
-def netcdf_left_out(path, known):
-    """Arrays that the netCDF library does not show, because netCDF has no such type: truth values and complex numbers."""
-    try:
-        import h5py
-    except ImportError:
-        return {}
-    if not h5py.is_hdf5(path):
-        return {}
-    with h5py.File(path, "r") as file:
-        return {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items()
-                if name not in known}
+    arrays = {f"/{name}": variable for name, variable in file.variables.items()}
+    found = candidates(arrays, {name: v.__dict__ for name, v in arrays.items()}, lambda name, v: name[1:] in v.dimensions, options.dataset)
+    variable = arrays[choose(path, found, options.dataset, "variable")]
+    scales = [file.variables.get(name) if name != variable.name else None for name in variable.dimensions]
+    coordinates = [(scale[:], plain(scale.__dict__)) if scale is not None and scale.ndim == 1 and is_real(scale.dtype) else None
+                   for scale in scales]
+    return described_image("netCDF", path, variable.dimensions, coordinates, variable, plain(variable.__dict__), options)
 
 
 CLASSIC_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8, 7: 1, 8: 2, 9: 4, 10: 8, 11: 8}
@@ -254,10 +222,8 @@ CLASSIC_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8, 7: 1, 8: 2, 9: 4, 10: 8, 11
 def check_classic(path):
     """Checks the length of a file of the classic format, because the library takes what is missing for zeros."""
     with open(path, "rb") as file:
-        magic = file.read(4)
-        if magic[:3] != b"CDF":
-            return
-        long = magic[3] == 5
+        version = file.read(4)[3]
+        long = version == 5
 
         def whole(is_long=long):
             return struct.unpack(">Q" if is_long else ">I", file.read(8 if is_long else 4))[0]
@@ -278,7 +244,7 @@ def check_classic(path):
             items(attribute)
             size = CLASSIC_SIZES[whole(False)]
             whole()
-            return shape, size, whole(magic[3] != 1)
+            return shape, size, whole(version != 1)
         records, dimensions = whole(), items(whole)
         items(attribute)
         variables = items(variable)
@@ -304,7 +270,7 @@ def read_zarr(path, options):
         refuse_other_zarr(path)
     root = zarr.open(zarr.DirectoryStore(path) if os.path.isdir(path) else zarr.ZipStore(path, mode="r"), mode="r")
     images = {"/": root} if isinstance(root, zarr.Array) else zarr_images(zarr, root)
-    found = {name: text_of(name, item.shape, item.dtype) if isinstance(item, zarr.Array) else f"{name} (OME-Zarr)"
+    found = {name: text_of(name, item) if isinstance(item, zarr.Array) else f"{name} (OME-Zarr)"
              for name, item in images.items()}
     wanted, level = options.dataset, None
     if wanted is None and "/" in images:
