@@ -345,6 +345,12 @@ def test_values_of_metaimage(tmp_path):
     assert np.array_equal(convert(metaimage(tmp_path / "b.mha", fields, packed)).values, ramp())
 
 
+def test_metaimage_as_text(tmp_path):
+    text = " ".join(map(str, ramp("i2").ravel() - 200)).encode()
+    made = convert(metaimage(tmp_path / "a.mha", {**BASE, "ElementType": "MET_SHORT", "BinaryData": False}, text))
+    assert np.array_equal(made.values, ramp("i2") - 200)
+
+
 def test_lists_and_channels_of_metaimage(tmp_path):
     for k, page in enumerate(ramp()):
         (tmp_path / f"s{k}.raw").write_bytes(page.tobytes())
@@ -359,7 +365,7 @@ def test_lists_and_channels_of_metaimage(tmp_path):
 
 
 @pytest.mark.parametrize("change", [{"ElementType": "MET_ASCII_CHAR"}, {"NDims": 5, "DimSize": "6 5 4 1 1"}, {"BinaryData": False},
-                                    {"ObjectType": "Mesh"}])
+                                    {"ObjectType": "Mesh"}, {"ElementType": "MET_UCHAR_ARRAY"}])
 def test_other_kinds_of_metaimage_are_refused(tmp_path, change):
     refused(esvr.BadInput, "a.mha", metaimage(tmp_path / "a.mha", {**BASE, **change}, ramp().tobytes()))
 
@@ -383,6 +389,16 @@ def test_arrays_of_vti(tmp_path):
     assert made.grid.value_type == "int64" and np.array_equal(made.values, ramp("i8") + 2 ** 40)
     active = vti(tmp_path / "b.vti", [("a", "UInt16", ramp()), ("b", "UInt16", ramp() + 1)], active=' Scalars="b"')
     assert convert(active).values[0, 0, 0] == 2
+
+
+def test_points_without_a_value_of_vti(tmp_path):
+    """As ParaView writes a mesh that is resampled."""
+    valid = np.ones((4, 5, 6), "i1")
+    valid[0, 0, :2] = 0
+    for kind, data in (("Int16", ramp("i2")), ("Float32", np.stack([ramp("f4")] * 3, axis=-1))):
+        made = convert(vti(tmp_path / "a.vti", [("a", kind, data), ("vtkValidPointMask", "Int8", valid), (
+            "vtkGhostType", "UInt8", 2 - 2 * valid)]))
+        assert made.missing == 2 and np.array_equal(made.active, valid == 1) and np.array_equal(made.values[3], data[3])
 
 
 def test_cells_and_extents_of_vti(tmp_path):
@@ -431,6 +447,7 @@ def test_missing_values_of_netcdf(weather, form):
     assert inactive(convert(weather(form=form, valid_max=np.int16(344)))) == [345, 346]
     assert inactive(convert(weather(form=form, scale_factor=0.5, add_offset=1.0, valid_range=np.array([2.5, 172.5])))) == [
         1, 2, 344, 345, 346]
+    assert inactive(convert(weather(form=form, scale_factor=-0.1, add_offset=1.0, valid_min=-33.4))) == [345, 346]
     made = convert(weather(fill=np.int16(1), form=form), "--stored")
     assert made.active.all() and made.values[0, 0, 0] == 1
 

@@ -118,8 +118,9 @@ def open_image(paths, options):
 
 def open_folder(folder, options):
     """A folder is a Zarr image, a stack of TIFF files, or series of DICOM files that may lie in folders of their own."""
-    with reading(folder, "an image"):
-        if read_science.is_zarr(folder):
+    is_zarr = read_science.is_zarr(folder)
+    with reading(folder, "Zarr" if is_zarr else "an image"):
+        if is_zarr:
             return read_science.read_zarr(folder, options)
         slices = [os.path.join(folder, name) for name in sorted(os.listdir(folder), key=natural)
                   if name.lower().endswith((".tif", ".tiff"))]

@@ -86,10 +86,15 @@ class Frame:
         self.times = tuple(as_number(find("FrameContentSequence", name)) for name in TIMES)
         self.along = find("PlaneOrientationSequence", "ImageOrientationPatient")
         self.position = find("PlanePositionSequence", "ImagePositionPatient")
+        step, detector = 0.0, header.get("DetectorInformationSequence")
+        if self.position is None and detector and "RECON TOMO" in header.get("ImageType", ()):  # of nuclear medicine
+            self.along, self.position = detector[0].get("ImageOrientationPatient"), detector[0].get("ImagePositionPatient")
+            step = float(header.get("SpacingBetweenSlices") or header.get("SliceThickness") or 1)
         self.is_placed = self.along is not None and self.position is not None
         if self.is_placed:
             self.along, self.position = np.array(self.along, float), np.array(self.position, float)
             self.normal = np.cross(self.along[:3], self.along[3:])
+            self.position = self.position + self.normal * step * number
             offsets = header.get("GridFrameOffsetVector")
             if offsets is not None and len(offsets) > number:  # of doses, from the first frame, or from the origin
                 self.position = self.position + self.normal * (float(offsets[number]) - (
@@ -106,6 +111,7 @@ def as_number(value):
 
 def frames_of(path, header):
     count = int(header.get("NumberOfFrames") or 1)
+    require_bytes(path, count, os.path.getsize(path), f"an image of {count} frames")
     shared, own = header.get("SharedFunctionalGroupsSequence"), header.get("PerFrameFunctionalGroupsSequence")
     if own is not None and len(own) != count:
         raise esvr.BadInput(f"{path} describes {len(own)} frames, and has {count}")

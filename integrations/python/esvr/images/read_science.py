@@ -181,9 +181,7 @@ def read_hdf5(path, options, format_name="HDF5"):
     found = candidates(arrays, {name: plain(item.attrs) for name, item in arrays.items()}, lambda _, item: h5py.h5ds.is_scale(item.id), options.dataset)
     name = choose(path, found, options.dataset, "dataset")
     dataset = arrays[name]
-    if dataset.chunks is None and dataset.id.get_offset() is not None:
-        require_bytes(path, product(dataset.shape) * dataset.dtype.itemsize, os.path.getsize(path) - dataset.id.get_offset(),
-                      f"the dataset {name}")
+    warnings = check_storage(path, name, dataset)
     scales = [dim[0] if len(dim) else None for dim in dataset.dims]
     names = [dim.label or (scale.name.rpartition("/")[2] if scale is not None else "") for dim, scale in zip(dataset.dims, scales)]
     attributes = plain(dataset.attrs)
@@ -194,7 +192,31 @@ def read_hdf5(path, options, format_name="HDF5"):
     sizes = attributes.get("element_size_um")
     if np.size(sizes) == 3:
         image.affine, image.unit = affine_of([abs(float(s)) or 1.0 for s in np.ravel(sizes)[::-1]]), "um"
+    image.warnings += warnings
     return image
+
+
+def check_storage(path, name, dataset):
+    """Checks that the numbers are there, since HDF5 takes those that are not for the fill value. Returns warnings."""
+    count = product(dataset.shape) * dataset.dtype.itemsize
+    if dataset.is_virtual:
+        for source in {source.file_name.replace("%b", "0") for source in dataset.virtual_sources() if source.file_name != "."}:
+            if not os.path.exists(os.path.join(os.path.dirname(path), source)):
+                raise esvr.BadInput(f"{path}: the dataset {name} has numbers in another file, {source}, which is missing")
+    elif dataset.external:
+        for other, offset, size in dataset.external:
+            other = os.path.join(os.path.dirname(path), os.fsdecode(other))
+            require_bytes(path, min(size, count), os.path.getsize(other) - offset, f"the dataset {name} in {other}")
+    elif dataset.chunks is None and dataset.id.get_offset() is not None:
+        require_bytes(path, count, os.path.getsize(path) - dataset.id.get_offset(), f"the dataset {name}")
+    elif dataset.chunks is not None:
+        chunks = product(-(-n // chunk) for n, chunk in zip(dataset.shape, dataset.chunks))
+        return missing_chunks(chunks - dataset.id.get_num_chunks(), chunks, dataset.fillvalue)
+    return []
+
+
+def missing_chunks(missing, count, fill):
+    return [f"{missing} of {count} chunks are not stored, and have the fill value {fill}"] if missing > 0 else []
 
 
 # -- netCDF --------------------------------------------------------------------------------------------------------
@@ -377,7 +399,7 @@ def check_chunks(path, array):
     missing = array.nchunks - stored
     if missing and array.fill_value is None:
         raise esvr.BadInput(f"{path}: {missing} of {array.nchunks} chunks are missing, and no fill value is named")
-    return [f"{missing} of {array.nchunks} chunks are not stored, and have the fill value {array.fill_value}"] if missing > 0 else []
+    return missing_chunks(missing, array.nchunks, array.fill_value)
 
 
 def check_blosc(path, folder):

@@ -8,7 +8,7 @@ import numpy as np
 import esvr
 
 from .image import (CHANNEL, MOST_DEFLATED, RAS, SPACE, TIME, VECTOR, Axis, Image, affine_of, axes_from_letters, by, head_of, in_memory,
-                    mapped, need, product, require_bytes, require_shape, unit_named, whole_or_packed)
+                    is_gzip, mapped, need, product, require_bytes, require_shape, unit_named, whole_or_packed)
 
 
 # -- numbers without a description -----------------------------------------------------------------------------------
@@ -51,21 +51,22 @@ VECTOR_INTENTS = {1006, 1007}  # displacements, vectors
 
 def read_nifti(path, options):
     need("nibabel", "python3-nibabel", path, "NIfTI")
-    from nibabel import AnalyzeHeader, Nifti1Header, Nifti2Header
+    from nibabel import Nifti1Header, Nifti2Header
     from nibabel.filename_parser import types_filenames
+    from nibabel.spm2analyze import Spm2AnalyzeHeader
     header_path = data_path = path
     if path.lower().removesuffix(".gz").endswith((".hdr", ".img")):
         names = types_filenames(path, (("image", ".img"), ("header", ".hdr")), trailing_suffixes=(".gz",))
         header_path, data_path = names["header"], names["image"]
     head = head_of(header_path, 540)
     magic = {head[344:348], head[4:8]}
-    kind = Nifti1Header if magic & {b"n+1\0", b"ni1\0"} else Nifti2Header if magic & {b"n+2\0", b"ni2\0"} else AnalyzeHeader
+    kind = Nifti1Header if magic & {b"n+1\0", b"ni1\0"} else Nifti2Header if magic & {b"n+2\0", b"ni2\0"} else Spm2AnalyzeHeader
     header = kind(head[:kind.template_dtype.itemsize], check=True)
     if magic & {b"n+1\0", b"n+2\0"}:
         data_path = header_path
     if not os.path.exists(data_path):
         raise esvr.BadInput(f"{path} has its voxels in another file, {data_path}, which is missing")
-    shape, dtype, is_nifti = header.get_data_shape(), header.get_data_dtype(), kind is not AnalyzeHeader
+    shape, dtype, is_nifti = header.get_data_shape(), header.get_data_dtype(), kind is not Spm2AnalyzeHeader
     axes = [Axis(name, n) for name, n in zip(["x", "y", "z", TIME, CHANNEL, "dim6", "dim7"], shape)][::-1]
     if len(shape) > 4 and shape[4] == 3 and is_nifti and int(header["intent_code"]) in VECTOR_INTENTS:
         axes[-5].kind = VECTOR
@@ -73,10 +74,10 @@ def read_nifti(path, options):
         axes.append(Axis("sample", len(dtype.names), labels=list(dtype.names)))
         dtype = dtype[0]
     matrix, unit, form = nifti_space(header)
-    slope, intercept = header.get_slope_inter() if is_nifti else (None, None)
+    slope, intercept = header.get_slope_inter()  # Analyze has those of SPM
     fetch = whole_or_packed(data_path, dtype, [axis.size for axis in axes], int(header.get_data_offset()))
     return Image("NIfTI" if is_nifti else "Analyze", path, axes, dtype, fetch, matrix, unit,
-                 None if slope is None else (float(slope), float(intercept)), notes=[form], metadata={"image_space": RAS})
+                 None if slope is None else (float(slope), float(intercept or 0)), notes=[form], metadata={"image_space": RAS})
 
 
 def nifti_space(header):
@@ -102,6 +103,9 @@ IMOD_STAMP = 1146047817  # of files of IMOD, whose flags say whether bytes are s
 def read_mrc(path, options):
     mrcfile = need("mrcfile", "python3-mrcfile", path, "MRC")
     from mrcfile.utils import data_dtype_from_header
+    extended = min(int.from_bytes(head_of(path, 96)[92:], order) for order in ("little", "big"))  # mrcfile takes memory for it at once
+    if not is_gzip(path):
+        require_bytes(path, 1024 + extended, os.path.getsize(path), "its header")
     with mrcfile.open(path, permissive=False, header_only=True) as file:
         header = file.header.copy()
     dtype = data_dtype_from_header(header)
@@ -149,6 +153,9 @@ def cell_axes(angles):
 
 
 # -- VTI -----------------------------------------------------------------------------------------------------------
+VALID = "vtkValidPointMask"  # of ParaView: 0 where a volume that was resampled has no value
+
+
 def read_vti(path, options):
     with open(path, "rb") as file:
         head = file.read(1 << 16)
@@ -157,11 +164,12 @@ def read_vti(path, options):
         raise esvr.BadInput(f"{path} is a VTK file of type {file_type[1].decode()}, which is not read; ImageData (.vti) is")
     need("vtkmodules.vtkIOXML", "python3-vtk9", path, "VTI")
     from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
     from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
     from vtkmodules.vtkIOXML import vtkXMLImageDataReader
     messages, reader = vtkStringOutputWindow(), vtkXMLImageDataReader()
     vtkOutputWindow.SetInstance(messages)
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
 
     def refuse_errors(what):
         text = " ".join(messages.GetOutput().split())
@@ -194,19 +202,23 @@ def read_vti(path, options):
     first = extent[:, 0] + [0.5 if is_cells and n > 1 else 0.0 for n in points]
     affine[:3, 3] = (affine @ [*first, 1.0])[:3]
     axes = axes_from_letters("zyx", size[::-1], path)
+    mask = None if is_cells else data.GetPointData().GetAbstractArray(VALID)
+    if mask is not None:
+        numbers = np.where(np.reshape(vtk_to_numpy(mask) != 0, (-1,) + (1,) * (numbers.ndim - 1)), numbers, np.nan)
     if components > 1:
         labels = [array.GetComponentName(c) or "" for c in range(components)]
         axes.append(Axis(VECTOR if components == 3 and numbers.dtype.kind == "f" else CHANNEL, components, "components", labels))
     unit = data.GetFieldData().GetAbstractArray("length_unit")  # vdb2image writes it
     return Image("VTI", path, axes, numbers.dtype, in_memory(numbers.reshape([axis.size for axis in axes])), affine,
-                 unit_named(unit.GetValue(0)) if unit is not None and unit.GetNumberOfValues() else None)
+                 unit_named(unit.GetValue(0)) if unit is not None and unit.GetNumberOfValues() else None,
+                 missing=np.isnan if mask is not None else None)
 
 
 def vti_array(path, head, reader, dataset):
-    """Whether the array is of cells, and its name. All other arrays are switched off."""
+    """Whether the array is of cells, and its name. All others, but for the mask of valid points, are switched off."""
     selections = {False: reader.GetPointDataArraySelection(), True: reader.GetCellDataArraySelection()}
     arrays = [(is_cells, selection.GetArrayName(k)) for is_cells, selection in selections.items()
-              for k in range(selection.GetNumberOfArrays())]
+              for k in range(selection.GetNumberOfArrays()) if selection.GetArrayName(k) not in (VALID, "vtkGhostType")]
     if not arrays:
         raise esvr.BadInput(f"{path} has no array")
     wanted = [array for array in arrays if dataset in (None, array[1])]
@@ -220,4 +232,5 @@ def vti_array(path, head, reader, dataset):
         selection.DisableAllArrays()
         if is_cells == wanted[0][0]:
             selection.EnableArray(wanted[0][1])
+            selection.EnableArray(VALID)
     return wanted[0]
