@@ -352,8 +352,8 @@ def convert(name, part, options, log):
         except Beyond as beyond:
             kind = conversion.kind
             if getattr(options, "as") != "auto" or conversion.normal or kind in ("vec3s", "int64"):
-                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind]}, up to which a grid of type {kind} "
-                                    f"holds whole numbers{'' if kind == 'int64' else '; --as integer keeps it'}") from beyond
+                raise esvr.BadInput(f"{part.image.path}: the value {beyond} is beyond 2^{EXACT[kind]}, up to which a grid of "
+                                    f"type {kind} holds whole numbers{'' if kind == 'int64' else '; --as integer keeps it'}") from beyond
             conversion.kind = "int32" if part.image.dtype == np.int32 and part.image.scale is None else "int64"
 
 

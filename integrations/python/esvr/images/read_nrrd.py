@@ -88,8 +88,8 @@ def encoded(path, offset, encoding, skip, dtype, shape, lines=0):
         if encoding in ("gz", "gzip", "bz2", "bzip2") and skip >= 0:
             return unpacked(path, dtype, shape, begin, skip, "deflate" if encoding[0] == "g" else "bzip2")
         if encoding not in ("ascii", "text", "txt", "hex"):
-            raise esvr.BadInput(f"{path} has the encoding '{encoding}' with a byte skip of {skip}, which is not read; raw, gzip, bzip2, "
-                                "ascii and hex are")
+            raise esvr.BadInput(f"{path} has the encoding '{encoding}' with a byte skip of {skip}, which is not read; raw, gzip, "
+                                "bzip2, ascii and hex are")
         text = file.read()[skip:].decode("ascii")
     require_bytes(path, 2 * size if encoding == "hex" else 2 * product(shape) - 1, len(text), "the data as text")
     if encoding == "hex":
@@ -147,8 +147,8 @@ def read_nrrd(path, options):
         image.metadata["value_unit"] = fields["sampleunits"].strip('"')
     segments = sorted(int(key[7:-5]) for key in fields if re.fullmatch(r"Segment\d+_Name", key))
     if segments:
-        image.metadata["image_segments"] = "; ".join(f"{fields.get(f'Segment{k}_LabelValue', '=?')[1:]}: {fields[f'Segment{k}_Name'][1:]}"
-                                                     for k in segments)
+        image.metadata["image_segments"] = "; ".join(
+            f"{fields.get(f'Segment{k}_LabelValue', '=?')[1:]}: {fields[f'Segment{k}_Name'][1:]}" for k in segments)
     return image
 
 
@@ -193,8 +193,8 @@ def nrrd_axes(path, fields, shape, options):
         spatial = [k for k in range(count) if (directions[k] is not None and np.any(directions[k]) if directions else
                                                kinds[k] in DOMAIN_KINDS)]
     if len(spatial) > 3:
-        raise esvr.UsageError(f"{path} has {count} axes ({' x '.join(map(str, shape))}, the fastest first), of which {len(spatial)} may "
-                              f"be of space; name them, the slowest first, by --axes, as in --axes {'ctzyx'[-count:]}")
+        raise esvr.UsageError(f"{path} has {count} axes ({' x '.join(map(str, shape))}, the fastest first), of which {len(spatial)} "
+                              f"may be of space; name them, the slowest first, by --axes, as in --axes {'ctzyx'[-count:]}")
     for kind, k in zip(SPACE, spatial):
         names[k] = kind
     return [Axis(name, n, label or kind) for name, n, label, kind in zip(names, shape, labels, kinds)], spatial, directions

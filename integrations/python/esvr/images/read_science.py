@@ -94,16 +94,16 @@ def step_of(numbers, attributes, name, warnings):
     return step, float(places[0]), str(attributes.get("units", ""))
 
 
-def candidates(arrays, attributes, is_coordinate, dataset):
-    """The texts of the arrays of which one may be the image, by their names: those of real numbers that are no coordinates and do
-    not describe others, with three axes, or with two if none has three. --dataset may name any array."""
+def candidates(arrays, attributes, coordinates, dataset):
+    """The texts of the arrays of which one may be the image, by their names: those of real numbers that are no coordinates (a set of
+    names) and do not describe others, with three axes, or with two if none has three. --dataset may name any array."""
     texts = {name: text_of(name, array) for name, array in arrays.items()}
     if dataset is not None:
         return texts
     described = {word for these in attributes.values() for name in ("bounds", "coordinates", "grid_mapping")
                  for word in str(these.get(name, "")).split()}
     found = {name: array.ndim for name, array in arrays.items() if is_real(array.dtype) and array.ndim >= 2 and array.size and
-             not is_coordinate(name, array) and name.rpartition("/")[2] not in described}
+             name not in coordinates and name.rpartition("/")[2] not in described}
     return {name: texts[name] for name, count in found.items() if count >= min(3, max(found.values()))}
 
 
@@ -178,7 +178,8 @@ def read_hdf5(path, options, format_name="HDF5"):
         if name in file:
             raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or OME-TIFF")
     file.visititems(lambda name, item: arrays.update({f"/{name}": item} if isinstance(item, h5py.Dataset) else {}))
-    found = candidates(arrays, {name: plain(item.attrs) for name, item in arrays.items()}, lambda _, item: h5py.h5ds.is_scale(item.id), options.dataset)
+    scales = {name for name, item in arrays.items() if h5py.h5ds.is_scale(item.id)}
+    found = candidates(arrays, {name: plain(item.attrs) for name, item in arrays.items()}, scales, options.dataset)
     name = choose(path, found, options.dataset, "dataset")
     dataset = arrays[name]
     warnings = check_storage(path, name, dataset)
@@ -230,7 +231,8 @@ def read_netcdf(path, options):
     file.set_auto_maskandscale(False)
     check_classic(path)
     arrays = {f"/{name}": variable for name, variable in file.variables.items()}
-    found = candidates(arrays, {name: v.__dict__ for name, v in arrays.items()}, lambda name, v: name[1:] in v.dimensions, options.dataset)
+    found = candidates(arrays, {name: variable.__dict__ for name, variable in arrays.items()},
+                       {name for name, variable in arrays.items() if name[1:] in variable.dimensions}, options.dataset)
     variable = arrays[choose(path, found, options.dataset, "variable")]
     scales = [file.variables.get(name) if name != variable.name else None for name in variable.dimensions]
     coordinates = [(scale[:], plain(scale.__dict__)) if scale is not None and scale.ndim == 1 and is_real(scale.dtype) else None
