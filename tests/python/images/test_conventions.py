@@ -523,6 +523,26 @@ def test_several_variables_are_listed(tmp_path):
     assert convert(tmp_path / "a.nc", "--dataset", "v").values[0, 0, 0] == 1001
 
 
+def test_members_and_bands_are_channels(tmp_path):
+    """As ERA5 and rioxarray write them; a dimension that nobody knows is taken for the one of space that is left, with a warning."""
+    netcdf = pytest.importorskip("netCDF4")
+    for name in ("number", "band", "run"):
+        with netcdf.Dataset(tmp_path / f"{name}.nc", "w") as file:
+            for dim, size in zip((name, "latitude", "longitude"), (4, 5, 6)):
+                file.createDimension(dim, size)
+            file.createVariable("t", "f4", (name, "latitude", "longitude"))[:] = ramp()
+    for name in ("number", "band"):
+        refused(esvr.UsageError, f"{name}: 4; choose by --channel", tmp_path / f"{name}.nc")
+        assert np.array_equal(convert(tmp_path / f"{name}.nc", "--channel", 2).values, ramp()[2:3])
+    assert convert(tmp_path / "run.nc").warnings == ["the axis run is taken for z (--axes names the axes)"]
+
+
+def test_what_matlab_keeps_for_itself(tmp_path):
+    with pytest.importorskip("h5py").File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["volume"], file["#refs#/a"] = ramp(), ramp() + 1
+    assert np.array_equal(convert(tmp_path / "a.mat").values, ramp())
+
+
 def test_dimensions_in_any_order(tmp_path):
     netcdf = pytest.importorskip("netCDF4")
     with netcdf.Dataset(tmp_path / "a.nc", "w") as file:

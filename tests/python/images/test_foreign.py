@@ -647,3 +647,31 @@ def test_tomograms_of_nuclear_medicine_by_pydicom(tmp_path):
         data.ImageType, data.PixelData = ["ORIGINAL", "PRIMARY", "RECON TOMO", "EMISSION"], ramp().tobytes()
         data.DetectorInformationSequence = pydicom.Sequence([detector])
     same(convert(dicom(tmp_path / "a", ramp()[:1], change=change)), ramp(), tilted())
+
+
+def test_palettes_of_dicom_by_pydicom(tmp_path):
+    folder = dicom(tmp_path / "a", ramp("u1")[:1], change=lambda _, data: setattr(data, "PhotometricInterpretation", "PALETTE COLOR"))
+    with pytest.raises(esvr.BadInput, match="PALETTE COLOR.*--stored"):
+        convert(folder)
+    same(convert(folder, "--stored"), ramp("u1")[:1])
+
+
+def test_masks_of_tiff_by_gdal(tmp_path):
+    gdal = pytest.importorskip("osgeo.gdal")
+    gdal.UseExceptions()
+    gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", "YES")
+    file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16)
+    file.GetRasterBand(1).WriteArray(ramp()[0])
+    file.CreateMaskBand(gdal.GMF_PER_DATASET)
+    file = None
+    gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", None)
+    made = convert(tmp_path / "a.tif")
+    same(made, ramp()[:1])
+    assert made.warnings == ["the mask of valid pixels is not read"]
+
+
+def test_ome_whose_description_is_elsewhere(tmp_path):
+    text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><BinaryOnly MetadataFile="a.ome" UUID="u"/></OME>'
+    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
+    with pytest.raises(esvr.BadInput, match="OME-XML in another file"):
+        convert(tmp_path / "a.ome.tif")

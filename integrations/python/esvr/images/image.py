@@ -72,7 +72,8 @@ class Axis:
 NAMES = {"x": "x", "y": "y", "z": "z", "c": CHANNEL, "s": "sample", "t": TIME, "v": VECTOR, "component": VECTOR,
          "depth": "z", "height": "y", "width": "x", "row": "y", "col": "x", "column": "x", "plane": "z",
          "channel": CHANNEL, "channels": CHANNEL, "time": TIME, "frame": TIME, "level": "z", "lev": "z", "altitude": "z",
-         "lat": "y", "latitude": "y", "lon": "x", "longitude": "x"}
+         "lat": "y", "latitude": "y", "lon": "x", "longitude": "x",
+         **{name: CHANNEL for name in ("band", "bands", "member", "number", "ensemble", "realization")}}
 
 
 def kind_named(name):

@@ -14,17 +14,12 @@ TIMES = ("TemporalPositionIdentifier", "TemporalPositionIndex", "TriggerTime", "
          "DiffusionBValue", "AcquisitionTime", "ContentTime", "InstanceNumber")
 
 
-def has_preamble(path):
-    with open(path, "rb") as file:
-        return file.read(132)[128:] == b"DICM"
-
-
 def is_dicom(path):
     with open(path, "rb") as file:
-        head = file.read(8)
+        head = file.read(132)
     # Files of old programs have no preamble and begin with one of the first elements of the group 8.
     begins = head[:2] == b"\x08\0" and head[3:4] == b"\0" and head[2:3] in b"\0\1\5\x08\x12\x14\x16\x18"
-    return has_preamble(path) or begins and (head[4:6] in (b"CS", b"UI", b"UL") or 0 < int.from_bytes(head[4:8], "little") <= 64)
+    return head[128:] == b"DICM" or begins and (head[4:6] in (b"CS", b"UI", b"UL") or 0 < int.from_bytes(head[4:8], "little") <= 64)
 
 
 def read_dicom(paths, options, folder=None):
@@ -33,7 +28,7 @@ def read_dicom(paths, options, folder=None):
     series, where = {}, folder or paths[0]
     for path in paths:
         with reading(path, "DICOM"):
-            header = pydicom.dcmread(path, stop_before_pixels=True, force=not has_preamble(path))
+            header = pydicom.dcmread(path, stop_before_pixels=True, force=True)
             list(header)  # the elements are decoded when they are asked for
         if str(header.get("Modality")) == "SEG":
             raise esvr.BadInput(f"{path} is a DICOM segmentation, which is not read; save it as Seg.nrrd or NIfTI")
@@ -121,8 +116,10 @@ def frames_of(path, header):
 # -- geometry --------------------------------------------------------------------------------------------------------
 def image_of(where, header, frames, options):
     samples, first, warnings = int(header.get("SamplesPerPixel", 1)), frames[0], []
-    if samples > 1 and header.PhotometricInterpretation != "RGB":
-        raise esvr.BadInput(f"{where} has colors as {header.PhotometricInterpretation}, which is not read; RGB is")
+    colors = header.get("PhotometricInterpretation", "")
+    if samples > 1 and colors != "RGB" or colors == "PALETTE COLOR" and not options.stored:
+        raise esvr.BadInput(f"{where} has colors as {colors}, which is not read; RGB is"
+                            f"{', and --stored takes the numbers of the palette' if samples == 1 else ''}")
     if header.get("ModalityLUTSequence") and not options.stored:
         raise esvr.BadInput(f"{where} has values that a table calibrates, which is not read; --stored takes the stored numbers")
     without = next((frame for frame in frames if not frame.is_placed), None)

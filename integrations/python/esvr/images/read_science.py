@@ -50,7 +50,8 @@ def number_of(attributes, name, default):
 
 
 STANDARD_NAMES = {"projection_x_coordinate": "x", "projection_y_coordinate": "y", "longitude": "x", "latitude": "y",
-                  "altitude": "z", "height": "z", "depth": "z", "time": TIME, "grid_longitude": "x", "grid_latitude": "y"}
+                  "altitude": "z", "height": "z", "depth": "z", "time": TIME, "forecast_period": TIME, "realization": CHANNEL,
+                  "grid_longitude": "x", "grid_latitude": "y"}
 
 
 def kind_of_dimension(attributes, name):
@@ -68,15 +69,18 @@ def kind_of_dimension(attributes, name):
     return kind if kind in (*SPACE, TIME, CHANNEL, VECTOR) else ""
 
 
-def named_axes(path, names, attributes, shape, options):
+def named_axes(path, names, attributes, shape, options, warnings):
     """The axes of dimensions by --axes, or by their names and the attributes of their coordinates. Dimensions that are not known
-    are those of space that are left, the last ones first."""
-    kinds = [kind_of_dimension(these, name) for these, name in zip(attributes, names)]
-    free = [kind for kind in SPACE if kind not in kinds]
-    for at in reversed(range(len(kinds))):
-        kinds[at] = kinds[at] or (free.pop(0) if free else f"axis{at}")
+    are those of space that are left, the last ones first, with a warning if others are known."""
     if options.axes:
-        kinds = [axis.kind for axis in axes_from_letters(options.axes, shape, path)]
+        return [Axis(axis.kind, axis.size, name) for axis, name in zip(axes_from_letters(options.axes, shape, path), names)]
+    kinds = [kind_of_dimension(these, name) for these, name in zip(attributes, names)]
+    free, is_known = [kind for kind in SPACE if kind not in kinds], bool(set(SPACE) & set(kinds))
+    for at in reversed(range(len(kinds))):
+        if not kinds[at]:
+            kinds[at] = free.pop(0) if free else f"axis{at}"
+            if is_known and kinds[at] in SPACE and shape[at] > 1:
+                warnings.append(f"the axis {names[at]} is taken for {kinds[at]} (--axes names the axes)")
     return [Axis(kind, n, name) for kind, n, name in zip(kinds, shape, names)]
 
 
@@ -100,10 +104,11 @@ def candidates(arrays, attributes, coordinates, dataset):
     texts = {name: text_of(name, array) for name, array in arrays.items()}
     if dataset is not None:
         return texts
+    # Names with a # are what MATLAB keeps for itself.
     described = {word for these in attributes.values() for name in ("bounds", "coordinates", "grid_mapping")
                  for word in str(these.get(name, "")).split()}
     found = {name: array.ndim for name, array in arrays.items() if is_real(array.dtype) and array.ndim >= 2 and array.size and
-             name not in coordinates and name.rpartition("/")[2] not in described}
+             name not in coordinates and not name.startswith("/#") and name.rpartition("/")[2] not in described}
     return {name: texts[name] for name, count in found.items() if count >= min(3, max(found.values()))}
 
 
@@ -113,7 +118,7 @@ def described_image(format_name, path, names, coordinates, array, attributes, op
     if not is_real(array.dtype):
         raise esvr.BadInput(f"{path}: the array holds {array.dtype}, and images hold real numbers")
     dtype, warnings = np.dtype(array.dtype), []
-    axes = named_axes(path, names, [c[1] if c else {} for c in coordinates], array.shape, options) if all(names) else \
+    axes = named_axes(path, names, [c[1] if c else {} for c in coordinates], array.shape, options, warnings) if all(names) else \
         unnamed_axes(path, array.shape, options)
     steps = [step_of(*coordinate, axis.name, warnings) if coordinate is not None and axis.kind in SPACE else (1.0, 0.0, None)
              for axis, coordinate in zip(axes, coordinates)]

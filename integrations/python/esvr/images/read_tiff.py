@@ -125,7 +125,7 @@ def series_of(path, file, dataset):
     one."""
     if is_scifio(file):
         return scifio_series(path, file), 0
-    series = [s for s in file.series if s.kind not in ("thumbnail", "label", "macro")]
+    series = [s for s in file.series if s.kind not in ("thumbnail", "label", "macro") and not is_mask(s.keyframe)]
     first = series[0]
     if file.is_ome and first.kind != "ome":
         return ome_series(path, file), 0
@@ -143,9 +143,16 @@ def series_of(path, file, dataset):
         + "; name one by --dataset and its number")
 
 
+def is_mask(page):
+    """Whether the pixels of a page say which pixels of another one are valid."""
+    return page is not None and bool(page.subfiletype & 4)
+
+
 def ome_series(path, file):
     """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the
     dimensions."""
+    if not ome_pixels(file):
+        raise esvr.BadInput(f"{path} has its OME-XML in another file, which is not read; save it as OME-TIFF with a description of its own")
     pixels = ome_pixels(file)[0]
     slow_first = pixels.get("DimensionOrder", "XYCZT")[:1:-1]
     sizes = {letter: int(pixels.get(f"Size{letter}", 1)) for letter in "CZT"}
@@ -259,6 +266,8 @@ def describe(path, file, page, said, number, options):
         said.steps = [[said.steps[0][0], 0.0, unit], [said.steps[1][0], 0.0, unit], [None, 0.0, unit]]
     else:  # without a unit, resolutions say the ratio of the edges only
         said.steps[0][0], said.steps[1][0] = 1.0, said.steps[1][0] / said.steps[0][0]
+    if any(is_mask(series.keyframe) for series in file.series):
+        said.warnings.append("the mask of valid pixels is not read")
     if page.tags.get("ModelPixelScaleTag"):
         said.warnings.append("the place on the earth is not read")
     if page.tags.get("GDAL_METADATA"):
