@@ -9,7 +9,7 @@ import esvr
 from . import program
 from .image import factor, product, unit_named
 from .program import Parser, byte_size, length_unit, option
-from .writers import FORMATS, INTEGERS, TYPES
+from .writers import FORMATS, INTEGERS, TYPES, WITHOUT_VECTORS
 
 SLAB_BYTES = 64 << 20
 ENDINGS = [ending for endings in FORMATS for ending in endings]
@@ -33,13 +33,15 @@ PARSER = Parser(
 class Volume:
     """The box of a grid that becomes an image.
 
-    dtype is that of the file, size the number of voxels along x, y and z, components 1 or 3, missing the number of voxels that are
-    missing (None if none is), and unit that of the lengths (None if it is not known).
+    dtype is that of the file, size the number of voxels along x, y and z, components 1 or 3, missing the number that stands for a
+    missing voxel (None if none is), and unit that of the lengths (None if it is not known).
     """
 
     def __init__(self, grid, out, format_name, options, log):
         self.grid, self.out, self.log, self.name, self.metadata = grid, str(out), log, grid.name, grid.metadata
         self.components = 3 if grid.value_type == "vec3s" else 1
+        if self.components == 3 and format_name in WITHOUT_VECTORS:
+            raise esvr.UsageError(f"vectors are not written as {format_name}; choose another format")
         self.begin, self.size = self._box(options)
         self._space(options)
         self.has_holes = bool(self.metadata.get("image_missing"))
@@ -70,13 +72,10 @@ class Volume:
         matrix = np.array(self.grid.transform, float)
         matrix[:3, 3] = (matrix @ [*self.begin, 1.0])[:3]
         unit = unit_named(str(self.metadata.get("length_unit", "")))
-        wanted = options.unit or unit_named(str(self.metadata.get("image_unit", ""))) or unit
-        self.unit = wanted if unit else unit
+        self.unit = options.unit or unit_named(str(self.metadata.get("image_unit", ""))) or unit
+        if unit:  # else numbers without a unit get one
+            matrix[:3] *= factor(unit, self.unit)
         self.matrix = matrix
-        if unit:
-            self.matrix[:3] *= factor(unit, wanted)
-        elif wanted:
-            self.unit = wanted  # numbers without a unit get one
 
     def matrix_in(self, unit):
         """The matrix from voxels to lengths in a unit. Fifteen digits undo the rounding of units that went and came back."""
@@ -148,6 +147,13 @@ class Volume:
                 values[gone] = self.missing
             self.log.progress("writing", last / self.size[2])
             yield np.ascontiguousarray(values)
+
+    def fill(self, array):
+        """Writes the slices into an array of a file."""
+        at = 0
+        for slab in self.slabs():
+            array[at:at + len(slab)] = slab
+            at += len(slab)
 
     def save(self, path, header, tail=b"", turn=None):
         """Writes a file of a header, the slices and an end."""
