@@ -362,6 +362,11 @@ def test_lists_and_channels_of_metaimage(tmp_path):
     two = np.stack([ramp(), ramp() + 1000], axis=-1)
     path = metaimage(tmp_path / "c.mha", {**BASE, "ElementNumberOfChannels": 2}, two.tobytes())
     assert np.array_equal(convert(path, "--channel", 1).values, ramp() + 1000)
+    for k, page in enumerate(two):
+        (tmp_path / f"t{k}.raw").write_bytes(page.tobytes())
+    (tmp_path / "d.mhd").write_text("\n".join(f"{k} = {v}" for k, v in {**BASE, "ElementNumberOfChannels": 2}.items()) +
+                                    "\nElementDataFile = LIST 2\n" + "".join(f"t{k}.raw\n" for k in range(4)))
+    assert np.array_equal(convert(tmp_path / "d.mhd", "--channel", 1).values, ramp() + 1000)
 
 
 @pytest.mark.parametrize("change", [{"ElementType": "MET_ASCII_CHAR"}, {"NDims": 5, "DimSize": "6 5 4 1 1"}, {"BinaryData": False},

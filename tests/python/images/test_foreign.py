@@ -675,3 +675,21 @@ def test_ome_whose_description_is_elsewhere(tmp_path):
     pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
     with pytest.raises(esvr.BadInput, match="OME-XML in another file"):
         convert(tmp_path / "a.ome.tif")
+
+
+@pytest.mark.parametrize("planar", ["contig", "separate"])
+def test_colors_from_below_by_tifffile(tmp_path, planar):
+    tifffile = pytest.importorskip("tifffile")
+    colors = np.stack([ramp()[0] + 1000 * k for k in range(3)], axis=-1 if planar == "contig" else 0)
+    tifffile.imwrite(tmp_path / "a.tif", colors, photometric="rgb", planarconfig=planar, metadata=None, extratags=[(274, 3, 1, 4, True)])
+    same(convert(tmp_path / "a.tif", "--channel", 2), ramp()[:1, ::-1] + 2000)
+
+
+def test_as_many_rows_as_colors_by_gdal(tmp_path):
+    gdal = pytest.importorskip("osgeo.gdal")
+    gdal.UseExceptions()
+    file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 3, 3, gdal.GDT_UInt16, ["COMPRESS=LZW", "INTERLEAVE=PIXEL"])
+    for k in range(3):
+        file.GetRasterBand(k + 1).WriteArray(ramp()[k, :3])
+    file = None
+    same(convert(tmp_path / "a.tif", "--channel", 1), ramp()[1:2, :3])

@@ -45,9 +45,10 @@ def text_header(path, separator, source, needed):
     return fields, begin
 
 
-def in_files(path, source, listed, shape, read):
+def in_files(path, source, listed, shape, read, components=0):
     """The function for Image.fetch of numbers in other files: in one, or in those of a list or a pattern, which divide the slowest
-    axes among them. read(name, shape) returns the function of one of them."""
+    axes among them. read(name, shape) returns the function of one of them. The numbers of axes in a header do not count so many
+    axes of components."""
     words = source.split()
     pattern = re.fullmatch(r"(.*%0?\d{0,2}[diu].*?)\s+(-?\d+)\s+(-?\d+)\s+(-?\d+)\s*(\d*)", source)
     if words[0].upper() == "LIST":
@@ -57,7 +58,7 @@ def in_files(path, source, listed, shape, read):
         numbers, name_of, axes = range(first, last + (1 if step > 0 else -1), step), pattern[1].__mod__, pattern[5]
     else:
         numbers, name_of, axes = range(1), lambda _: source, ""
-    leading = max(len(shape) - int(axes or len(shape) - 1), 1)
+    leading = max(len(shape) - (int(axes) + components if axes else len(shape) - 1), 1)
     count = product(shape[:leading])
     if not numbers or count % len(numbers):
         raise esvr.BadInput(f"{path} names {len(numbers)} files of data for {count} slices")
@@ -248,7 +249,7 @@ def read_metaimage(path, options):
         fetch = encoded(path, begin, encoding, 0, dtype, sizes)
     else:
         fetch = in_files(path, fields["elementdatafile"], fields.get("files"), sizes,
-                         lambda name, part: encoded(name, 0, encoding, skip, dtype, part))
+                         lambda name, part: encoded(name, 0, encoding, skip, dtype, part), int(channels > 1))
     slope, intercept = (float(fields.get(f"elementtointensityfunction{name}", n)) for name, n in (("slope", 1), ("offset", 0)))
     image = Image("MetaImage", path, axes, dtype, fetch, LPS_TO_RAS @ meta_matrix(fields, count), "mm",
                   (slope, intercept) if slope else None, metadata={"image_space": LPS})

@@ -228,14 +228,14 @@ def page_array(path, file, page):
             raise esvr.BadInput(f"{path} has floats in big-endian order with predictor 3, which GDAL decodes wrongly")
         data = gdal.Open(f"GTIFF_DIR:{page.index + 1}:{page.parent.filehandle.path}")
         array = data.ReadAsArray()
-        if array.ndim == 3 and array.shape[0] != page.shape[0]:
+        if array.ndim == 3 and page.keyframe.axes.endswith("S"):
             array = np.moveaxis(array, 0, -1)
     said = page.keyframe.tags.get("Orientation")
     orientation = int(said.value) if said else 1
     if orientation > 4:
         raise esvr.BadInput(f"{path} has the orientation {orientation}, whose rows are columns; this is not read")
-    array = array[::-1] if orientation in (3, 4) else array
-    return array[:, ::-1] if orientation in (2, 3) else array
+    turned = [letter for letter, those in (("Y", (3, 4)), ("X", (2, 3))) if orientation in those]
+    return np.flip(array, [page.keyframe.axes.index(letter) for letter in turned])
 
 
 # -- descriptions --------------------------------------------------------------------------------------------------
