@@ -2,7 +2,7 @@
 """The record: one table of what this version of the programs does, to compare with the version before.
 
     record.py measure --bin FOLDER --data FOLDER --out record.json [--jobs N] [--resume]
-    record.py page record.json [--before OLD.json] [--page docs/record.md]
+    record.py page record.json [--before OLD.json] [--page docs/figures/record.md]
     record.py compare OLD.json NEW.json
 
 `measure` converts ten volumes with six goals and writes the figures of each case to the JSON file as soon as they are
@@ -483,7 +483,7 @@ def parse():
     job = commands.add_parser("page", help="write the table")
     job.add_argument("record", type=pathlib.Path)
     job.add_argument("--before", type=pathlib.Path, help="an earlier record")
-    job.add_argument("--page", type=pathlib.Path, default=pathlib.Path("docs/record.md"))
+    job.add_argument("--page", type=pathlib.Path, default=pathlib.Path("docs/figures/record.md"))
     job = commands.add_parser("compare", help="exit with 4 if figures got worse")
     job.add_argument("old", type=pathlib.Path)
     job.add_argument("new", type=pathlib.Path)

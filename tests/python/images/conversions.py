@@ -73,13 +73,13 @@ class Quiet:
 
 def convert_all(*words):
     """All grids of an image, time after time."""
-    arguments = image2vdb.PROGRAM.parse([str(word) for word in words] + ["out.vdb"])
+    arguments = image2vdb.PARSER.parse([str(word) for word in words] + ["out.vdb"])
     image = image2vdb.open_image(arguments.files[:-1], arguments)
     made = []
     for _, parts in image2vdb.chosen_parts(image, arguments):
         for name, part in parts:
-            grid, tally, _ = image2vdb.convert(name, part, arguments, Quiet())
-            made.append(Converted(grid, image.warnings, image.notes, tally.missing))
+            grid, conversion = image2vdb.convert(name, part, arguments, Quiet())
+            made.append(Converted(grid, image.warnings, image.notes, conversion.missing))
     return made
 
 

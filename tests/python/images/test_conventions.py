@@ -345,6 +345,12 @@ def test_values_of_metaimage(tmp_path):
     assert np.array_equal(convert(metaimage(tmp_path / "b.mha", fields, packed)).values, ramp())
 
 
+def test_metaimage_as_text(tmp_path):
+    text = " ".join(map(str, ramp("i2").ravel() - 200)).encode()
+    made = convert(metaimage(tmp_path / "a.mha", {**BASE, "ElementType": "MET_SHORT", "BinaryData": False}, text))
+    assert np.array_equal(made.values, ramp("i2") - 200)
+
+
 def test_lists_and_channels_of_metaimage(tmp_path):
     for k, page in enumerate(ramp()):
         (tmp_path / f"s{k}.raw").write_bytes(page.tobytes())
@@ -356,10 +362,15 @@ def test_lists_and_channels_of_metaimage(tmp_path):
     two = np.stack([ramp(), ramp() + 1000], axis=-1)
     path = metaimage(tmp_path / "c.mha", {**BASE, "ElementNumberOfChannels": 2}, two.tobytes())
     assert np.array_equal(convert(path, "--channel", 1).values, ramp() + 1000)
+    for k, page in enumerate(two):
+        (tmp_path / f"t{k}.raw").write_bytes(page.tobytes())
+    (tmp_path / "d.mhd").write_text("\n".join(f"{k} = {v}" for k, v in {**BASE, "ElementNumberOfChannels": 2}.items()) +
+                                    "\nElementDataFile = LIST 2\n" + "".join(f"t{k}.raw\n" for k in range(4)))
+    assert np.array_equal(convert(tmp_path / "d.mhd", "--channel", 1).values, ramp() + 1000)
 
 
 @pytest.mark.parametrize("change", [{"ElementType": "MET_ASCII_CHAR"}, {"NDims": 5, "DimSize": "6 5 4 1 1"}, {"BinaryData": False},
-                                    {"ObjectType": "Mesh"}])
+                                    {"ObjectType": "Mesh"}, {"ElementType": "MET_UCHAR_ARRAY"}])
 def test_other_kinds_of_metaimage_are_refused(tmp_path, change):
     refused(esvr.BadInput, "a.mha", metaimage(tmp_path / "a.mha", {**BASE, **change}, ramp().tobytes()))
 
@@ -383,6 +394,16 @@ def test_arrays_of_vti(tmp_path):
     assert made.grid.value_type == "int64" and np.array_equal(made.values, ramp("i8") + 2 ** 40)
     active = vti(tmp_path / "b.vti", [("a", "UInt16", ramp()), ("b", "UInt16", ramp() + 1)], active=' Scalars="b"')
     assert convert(active).values[0, 0, 0] == 2
+
+
+def test_points_without_a_value_of_vti(tmp_path):
+    """As ParaView writes a mesh that is resampled."""
+    valid = np.ones((4, 5, 6), "i1")
+    valid[0, 0, :2] = 0
+    for kind, data in (("Int16", ramp("i2")), ("Float32", np.stack([ramp("f4")] * 3, axis=-1))):
+        made = convert(vti(tmp_path / "a.vti", [("a", kind, data), ("vtkValidPointMask", "Int8", valid), (
+            "vtkGhostType", "UInt8", 2 - 2 * valid)]))
+        assert made.missing == 2 and np.array_equal(made.active, valid == 1) and np.array_equal(made.values[3], data[3])
 
 
 def test_cells_and_extents_of_vti(tmp_path):
@@ -431,6 +452,7 @@ def test_missing_values_of_netcdf(weather, form):
     assert inactive(convert(weather(form=form, valid_max=np.int16(344)))) == [345, 346]
     assert inactive(convert(weather(form=form, scale_factor=0.5, add_offset=1.0, valid_range=np.array([2.5, 172.5])))) == [
         1, 2, 344, 345, 346]
+    assert inactive(convert(weather(form=form, scale_factor=-0.1, add_offset=1.0, valid_min=-33.4))) == [345, 346]
     made = convert(weather(fill=np.int16(1), form=form), "--stored")
     assert made.active.all() and made.values[0, 0, 0] == 1
 
@@ -504,6 +526,26 @@ def test_several_variables_are_listed(tmp_path):
             file.createVariable(name, "f4", ("z", "y", "x"))[:] = ramp() + (1000 if name == "v" else 0)
     refused(esvr.UsageError, r"several images: /u \(4 x 5 x 6 float32\), /v", tmp_path / "a.nc")
     assert convert(tmp_path / "a.nc", "--dataset", "v").values[0, 0, 0] == 1001
+
+
+def test_members_and_bands_are_channels(tmp_path):
+    """As ERA5 and rioxarray write them; a dimension that nobody knows is taken for the one of space that is left, with a warning."""
+    netcdf = pytest.importorskip("netCDF4")
+    for name in ("number", "band", "run"):
+        with netcdf.Dataset(tmp_path / f"{name}.nc", "w") as file:
+            for dim, size in zip((name, "latitude", "longitude"), (4, 5, 6)):
+                file.createDimension(dim, size)
+            file.createVariable("t", "f4", (name, "latitude", "longitude"))[:] = ramp()
+    for name in ("number", "band"):
+        refused(esvr.UsageError, f"{name}: 4; choose by --channel", tmp_path / f"{name}.nc")
+        assert np.array_equal(convert(tmp_path / f"{name}.nc", "--channel", 2).values, ramp()[2:3])
+    assert convert(tmp_path / "run.nc").warnings == ["the axis run is taken for z (--axes names the axes)"]
+
+
+def test_what_matlab_keeps_for_itself(tmp_path):
+    with pytest.importorskip("h5py").File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["volume"], file["#refs#/a"] = ramp(), ramp() + 1
+    assert np.array_equal(convert(tmp_path / "a.mat").values, ramp())
 
 
 def test_dimensions_in_any_order(tmp_path):

@@ -196,7 +196,7 @@ def test_cut_edge_chunks_of_zarr(tmp_path, capfd):
     assert attempt(tmp_path / "a.zarr", capfd) == 3
 
 
-@pytest.mark.parametrize("name", ["a.nii", "a.nrrd", "a.mha", "a.npy", "a.mrc", "a.vti", "a.raw"])
+@pytest.mark.parametrize("name", ["a.nii", "a.nrrd", "a.mha", "a.npy", "a.mrc", "b.mrc", "a.vti", "a.raw", "a.dcm"])
 def test_promises_are_checked_before_memory_is_taken(tmp_path, capfd, name):
     path = tmp_path / name
     if name == "a.nii":
@@ -207,11 +207,14 @@ def test_promises_are_checked_before_memory_is_taken(tmp_path, capfd, name):
     elif name == "a.npy":
         np.save(path, ramp())
         path.write_bytes(path.read_bytes().replace(b"(4, 5, 6), }        ", b"(4000, 5000, 6000), }"[:20].ljust(20)))
-    elif name == "a.mrc":
-        FILES[name](path)
+    elif name.endswith(".mrc"):
+        make_mrc(path)
         data = bytearray(path.read_bytes())
-        data[0:12] = np.array([2000, 2000, 2000], "<i4").tobytes()
+        at = 0 if name == "a.mrc" else 92  # the sizes, or the length of a second header
+        data[at:at + 12] = np.array([2000, 2000, 2000] if name == "a.mrc" else [2 ** 31 - 1, 0, 0], "<i4").tobytes()
         path.write_bytes(data)
+    elif name == "a.dcm":
+        shutil.copy(dicom(tmp_path / "s", ramp()[:1], change=lambda _, data: setattr(data, "NumberOfFrames", 10 ** 9)) / "s0.dcm", path)
     elif name == "a.raw":
         path.write_bytes(bytes(416))
     else:

@@ -59,6 +59,17 @@ def test_qform_alone_by_nibabel(tmp_path, is_left_handed):
     assert (np.linalg.det(made.matrix) < 0) == is_left_handed
 
 
+def test_analyze_of_spm_by_nibabel(tmp_path):
+    """SPM keeps a factor where other programs have nothing."""
+    nibabel = pytest.importorskip("nibabel")
+    image = nibabel.Spm99AnalyzeImage(ramp("f4").transpose(2, 1, 0) / 7, np.diag([-2, 2, 3, 1.0]))
+    image.set_data_dtype("i2")
+    image.to_filename(tmp_path / "a.img")
+    stored = np.asarray(nibabel.load(tmp_path / "a.img").dataobj).transpose(2, 1, 0)
+    same(convert(tmp_path / "a.img"), stored.astype("f4"))
+    assert abs(stored - ramp() / 7).max() < 0.01
+
+
 def test_analyze_by_nibabel(tmp_path):
     nibabel = pytest.importorskip("nibabel")
     image = nibabel.AnalyzeImage(ramp("i2").transpose(2, 1, 0), np.diag([0.5, 0.75, 2, 1]))
@@ -415,6 +426,29 @@ def test_hdf5_by_h5py(tmp_path):
     same(made, ramp(), np.diag([0.5, 0.75, 2, 1]))
 
 
+def test_hdf5_whose_numbers_are_elsewhere_by_h5py(tmp_path, monkeypatch):
+    """HDF5 takes what is not there for the fill value."""
+    h5py = pytest.importorskip("h5py")
+    monkeypatch.chdir(tmp_path)
+    layout = h5py.VirtualLayout((4, 5, 6), "u2")
+    layout[:] = h5py.VirtualSource("source.h5", "d", (4, 5, 6))
+    with h5py.File("source.h5", "w") as file, h5py.File("a.h5", "w") as virtual, h5py.File("b.h5", "w") as external, \
+            h5py.File("c.h5", "w") as part:
+        file["d"] = ramp()
+        virtual.create_virtual_dataset("d", layout)
+        external.create_dataset("d", (4, 5, 6), "u2", external=[("b.raw", 0, 240)])
+        part.create_dataset("d", (8, 5, 6), "u2", chunks=(2, 5, 6))[:4] = ramp()
+    (tmp_path / "b.raw").write_bytes(ramp().tobytes())
+    same(convert(tmp_path / "a.h5"), ramp())
+    same(convert(tmp_path / "b.h5"), ramp())
+    assert convert(tmp_path / "c.h5").warnings == ["2 of 4 chunks are not stored, and have the fill value 0"]
+    (tmp_path / "source.h5").unlink()
+    (tmp_path / "b.raw").write_bytes(ramp().tobytes()[:100])
+    for name, what in (("a.h5", "source.h5, which is missing"), ("b.h5", "cut short")):
+        with pytest.raises(esvr.BadInput, match=what):
+            convert(tmp_path / name)
+
+
 @pytest.mark.parametrize("kind", ["f2", "f4", "f8", "i8", "u8", "bool"])
 def test_hdf5_types_by_h5py(tmp_path, kind):
     h5py = pytest.importorskip("h5py")
@@ -599,3 +633,63 @@ def test_raw_by_struct(tmp_path, endian):
 def test_npy_by_numpy(tmp_path, is_fortran):
     np.save(tmp_path / "a.npy", np.asfortranarray(ramp()) if is_fortran else ramp())
     same(convert(tmp_path / "a.npy"), ramp())
+
+
+def test_tomograms_of_nuclear_medicine_by_pydicom(tmp_path):
+    """Frames have their place in the description of the detector."""
+    pydicom = pytest.importorskip("pydicom")
+
+    def change(_, data):
+        detector = pydicom.Dataset()
+        detector.ImageOrientationPatient, detector.ImagePositionPatient = data.ImageOrientationPatient, data.ImagePositionPatient
+        del data.ImageOrientationPatient, data.ImagePositionPatient
+        data.Modality, data.NumberOfFrames, data.SpacingBetweenSlices = "NM", 4, 2.0
+        data.ImageType, data.PixelData = ["ORIGINAL", "PRIMARY", "RECON TOMO", "EMISSION"], ramp().tobytes()
+        data.DetectorInformationSequence = pydicom.Sequence([detector])
+    same(convert(dicom(tmp_path / "a", ramp()[:1], change=change)), ramp(), tilted())
+
+
+def test_palettes_of_dicom_by_pydicom(tmp_path):
+    folder = dicom(tmp_path / "a", ramp("u1")[:1], change=lambda _, data: setattr(data, "PhotometricInterpretation", "PALETTE COLOR"))
+    with pytest.raises(esvr.BadInput, match="PALETTE COLOR.*--stored"):
+        convert(folder)
+    same(convert(folder, "--stored"), ramp("u1")[:1])
+
+
+def test_masks_of_tiff_by_gdal(tmp_path):
+    gdal = pytest.importorskip("osgeo.gdal")
+    gdal.UseExceptions()
+    gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", "YES")
+    file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16)
+    file.GetRasterBand(1).WriteArray(ramp()[0])
+    file.CreateMaskBand(gdal.GMF_PER_DATASET)
+    file = None
+    gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", None)
+    made = convert(tmp_path / "a.tif")
+    same(made, ramp()[:1])
+    assert made.warnings == ["the mask of valid pixels is not read"]
+
+
+def test_ome_whose_description_is_elsewhere(tmp_path):
+    text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><BinaryOnly MetadataFile="a.ome" UUID="u"/></OME>'
+    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
+    with pytest.raises(esvr.BadInput, match="OME-XML in another file"):
+        convert(tmp_path / "a.ome.tif")
+
+
+@pytest.mark.parametrize("planar", ["contig", "separate"])
+def test_colors_from_below_by_tifffile(tmp_path, planar):
+    tifffile = pytest.importorskip("tifffile")
+    colors = np.stack([ramp()[0] + 1000 * k for k in range(3)], axis=-1 if planar == "contig" else 0)
+    tifffile.imwrite(tmp_path / "a.tif", colors, photometric="rgb", planarconfig=planar, metadata=None, extratags=[(274, 3, 1, 4, True)])
+    same(convert(tmp_path / "a.tif", "--channel", 2), ramp()[:1, ::-1] + 2000)
+
+
+def test_as_many_rows_as_colors_by_gdal(tmp_path):
+    gdal = pytest.importorskip("osgeo.gdal")
+    gdal.UseExceptions()
+    file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 3, 3, gdal.GDT_UInt16, ["COMPRESS=LZW", "INTERLEAVE=PIXEL"])
+    for k in range(3):
+        file.GetRasterBand(k + 1).WriteArray(ramp()[k, :3])
+    file = None
+    same(convert(tmp_path / "a.tif", "--channel", 1), ramp()[1:2, :3])

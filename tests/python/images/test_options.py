@@ -8,7 +8,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from esvr.images import image2vdb, program, vdb2image
+from esvr.images import image2vdb, vdb2image
 
 from conversions import convert, ramp, run, run_here
 
@@ -32,13 +32,13 @@ TESTS = {
 
 @pytest.mark.parametrize("module", TESTS)
 def test_every_option_has_a_test(module):
-    options = {f"--{option.name}": option.short for option in module.PROGRAM.options + program.COMMON}
+    options = {option.option_strings[-1]: option.option_strings[0] for option in module.PARSER.options}
     assert set(TESTS[module]) == set(options)
     source = "\n".join(path.read_text() for path in sorted(pathlib.Path(__file__).parent.glob("test_*.py")))
     for option, test in TESTS[module].items():
         body = re.search(rf"^def {test}\(.*?(?=^\S|\Z)", source, re.MULTILINE | re.DOTALL)
         assert body, f"{option}: there is no {test}"
-        assert f'"{option}"' in body[0] or f'"-{options[option]}"' in body[0], f"{test} does not use {option}"
+        assert f'"{option}"' in body[0] or f'"{options[option]}"' in body[0], f"{test} does not use {option}"
 
 
 def test_names_thresholds_and_backgrounds(tmp_path):

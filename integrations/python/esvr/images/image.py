@@ -72,7 +72,8 @@ class Axis:
 NAMES = {"x": "x", "y": "y", "z": "z", "c": CHANNEL, "s": "sample", "t": TIME, "v": VECTOR, "component": VECTOR,
          "depth": "z", "height": "y", "width": "x", "row": "y", "col": "x", "column": "x", "plane": "z",
          "channel": CHANNEL, "channels": CHANNEL, "time": TIME, "frame": TIME, "level": "z", "lev": "z", "altitude": "z",
-         "lat": "y", "latitude": "y", "lon": "x", "longitude": "x"}
+         "lat": "y", "latitude": "y", "lon": "x", "longitude": "x",
+         **{name: CHANNEL for name in ("band", "bands", "member", "number", "ensemble", "realization")}}
 
 
 def kind_named(name):
@@ -90,6 +91,7 @@ def axes_from_letters(letters, shape, path):
 
 
 # -- orientation ---------------------------------------------------------------------------------------------------
+LPS, RAS = "left-posterior-superior", "right-anterior-superior"
 LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 
@@ -295,6 +297,10 @@ class Image:
         for kind in set(kinds):
             if kinds.count(kind) > 1:
                 raise esvr.BadInput(f"{self.path}: two axes of the image are {kind} ({', '.join(a.text() for a in self.axes)})")
+
+    def name_channels(self, labels):
+        if self.axis(CHANNEL) and len(labels) == self.axis(CHANNEL).size and any(labels):
+            self.axis(CHANNEL).labels = labels
 
     def axis(self, kind):
         return next((axis for axis in self.axes if axis.kind == kind), None)

@@ -6,7 +6,7 @@ import numpy as np
 
 import esvr
 
-from .image import LPS_TO_RAS, TIME, Axis, Image, affine_of, natural, need, planes, product, reading, require_bytes
+from .image import LPS, LPS_TO_RAS, TIME, Axis, Image, affine_of, natural, need, planes, product, reading, require_bytes
 
 EVEN = 0.01  # by this share of a slice, distances of slices may differ
 SAME = ("Rows", "Columns", "SamplesPerPixel", "BitsAllocated", "PixelRepresentation", "PhotometricInterpretation")
@@ -14,17 +14,12 @@ TIMES = ("TemporalPositionIdentifier", "TemporalPositionIndex", "TriggerTime", "
          "DiffusionBValue", "AcquisitionTime", "ContentTime", "InstanceNumber")
 
 
-def has_preamble(path):
-    with open(path, "rb") as file:
-        return file.read(132)[128:] == b"DICM"
-
-
 def is_dicom(path):
     with open(path, "rb") as file:
-        head = file.read(8)
+        head = file.read(132)
     # Files of old programs have no preamble and begin with one of the first elements of the group 8.
     begins = head[:2] == b"\x08\0" and head[3:4] == b"\0" and head[2:3] in b"\0\1\5\x08\x12\x14\x16\x18"
-    return has_preamble(path) or begins and (head[4:6] in (b"CS", b"UI", b"UL") or 0 < int.from_bytes(head[4:8], "little") <= 64)
+    return head[128:] == b"DICM" or begins and (head[4:6] in (b"CS", b"UI", b"UL") or 0 < int.from_bytes(head[4:8], "little") <= 64)
 
 
 def read_dicom(paths, options, folder=None):
@@ -33,7 +28,7 @@ def read_dicom(paths, options, folder=None):
     series, where = {}, folder or paths[0]
     for path in paths:
         with reading(path, "DICOM"):
-            header = pydicom.dcmread(path, stop_before_pixels=True, force=not has_preamble(path))
+            header = pydicom.dcmread(path, stop_before_pixels=True, force=True)
             list(header)  # the elements are decoded when they are asked for
         if str(header.get("Modality")) == "SEG":
             raise esvr.BadInput(f"{path} is a DICOM segmentation, which is not read; save it as Seg.nrrd or NIfTI")
@@ -41,15 +36,14 @@ def read_dicom(paths, options, folder=None):
             series.setdefault(str(header.get("SeriesInstanceUID", "")), []).append((path, header))
     if not series:
         raise esvr.BadInput(f"{where} has no DICOM image")
-    with reading(where, "DICOM"):
-        files = chosen_series(where, series, options)
-        header = files[0][1]
-        for path, other in files:
-            for name in SAME:
-                if other.get(name) != header.get(name):
-                    raise esvr.BadInput(f"{path} has {name} {other.get(name)}, and {files[0][0]} has {header.get(name)}; slices of "
-                                        "one image have one size and type")
-        return image_of(where, header, [frame for path, other in files for frame in frames_of(path, other)], options)
+    files = chosen_series(where, series, options)
+    header = files[0][1]
+    for path, other in files:
+        for name in SAME:
+            if other.get(name) != header.get(name):
+                raise esvr.BadInput(f"{path} has {name} {other.get(name)}, and {files[0][0]} has {header.get(name)}; slices of one "
+                                    "image have one size and type")
+    return image_of(where, header, [frame for path, other in files for frame in frames_of(path, other)], options)
 
 
 def chosen_series(where, series, options):
@@ -87,10 +81,15 @@ class Frame:
         self.times = tuple(as_number(find("FrameContentSequence", name)) for name in TIMES)
         self.along = find("PlaneOrientationSequence", "ImageOrientationPatient")
         self.position = find("PlanePositionSequence", "ImagePositionPatient")
+        step, detector = 0.0, header.get("DetectorInformationSequence")
+        if self.position is None and detector and "RECON TOMO" in header.get("ImageType", ()):  # of nuclear medicine
+            self.along, self.position = detector[0].get("ImageOrientationPatient"), detector[0].get("ImagePositionPatient")
+            step = float(header.get("SpacingBetweenSlices") or header.get("SliceThickness") or 1)
         self.is_placed = self.along is not None and self.position is not None
         if self.is_placed:
             self.along, self.position = np.array(self.along, float), np.array(self.position, float)
             self.normal = np.cross(self.along[:3], self.along[3:])
+            self.position = self.position + self.normal * step * number
             offsets = header.get("GridFrameOffsetVector")
             if offsets is not None and len(offsets) > number:  # of doses, from the first frame, or from the origin
                 self.position = self.position + self.normal * (float(offsets[number]) - (
@@ -107,6 +106,7 @@ def as_number(value):
 
 def frames_of(path, header):
     count = int(header.get("NumberOfFrames") or 1)
+    require_bytes(path, count, os.path.getsize(path), f"an image of {count} frames")
     shared, own = header.get("SharedFunctionalGroupsSequence"), header.get("PerFrameFunctionalGroupsSequence")
     if own is not None and len(own) != count:
         raise esvr.BadInput(f"{path} describes {len(own)} frames, and has {count}")
@@ -116,8 +116,10 @@ def frames_of(path, header):
 # -- geometry --------------------------------------------------------------------------------------------------------
 def image_of(where, header, frames, options):
     samples, first, warnings = int(header.get("SamplesPerPixel", 1)), frames[0], []
-    if samples > 1 and header.PhotometricInterpretation != "RGB":
-        raise esvr.BadInput(f"{where} has colors as {header.PhotometricInterpretation}, which is not read; RGB is")
+    colors = header.get("PhotometricInterpretation", "")
+    if samples > 1 and colors != "RGB" or colors == "PALETTE COLOR" and not options.stored:
+        raise esvr.BadInput(f"{where} has colors as {colors}, which is not read; RGB is"
+                            f"{', and --stored takes the numbers of the palette' if samples == 1 else ''}")
     if header.get("ModalityLUTSequence") and not options.stored:
         raise esvr.BadInput(f"{where} has values that a table calibrates, which is not read; --stored takes the stored numbers")
     without = next((frame for frame in frames if not frame.is_placed), None)
@@ -143,7 +145,7 @@ def image_of(where, header, frames, options):
     if samples > 1:
         axes.append(Axis("sample", samples))
     dtype, fetch, scale, missing = numbers_of(volumes, samples, options)
-    metadata = {} if without else {"image_space": "left-posterior-superior"}
+    metadata = {} if without else {"image_space": LPS}
     if header.get("RescaleType"):
         metadata["value_unit"] = str(header.RescaleType)
     return Image("DICOM", where, axes, dtype, fetch, LPS_TO_RAS @ affine, "mm" if first.spacing is not None else None, scale,

@@ -8,8 +8,8 @@ import numpy as np
 
 import esvr
 
-from .image import CHANNEL, SPACE, TIME, VECTOR, Axis, Image, affine_of, affine_of_steps, axes_from_letters, kind_named, \
-    missing_if_any, need, product, reading, require_bytes
+from .image import (CHANNEL, SPACE, TIME, VECTOR, Axis, Image, affine_of, affine_of_steps, axes_from_letters, kind_named,
+                    missing_if_any, need, product, require_bytes)
 from .read_volumes import unnamed_axes
 
 
@@ -27,8 +27,8 @@ def choose(path, found, dataset, what):
     return next(iter(found))
 
 
-def text_of(name, shape, dtype):
-    return f"{name} ({' x '.join(map(str, shape))} {dtype})"
+def text_of(name, array):
+    return f"{name} ({' x '.join(map(str, array.shape))} {getattr(array.dtype, 'name', array.dtype)})"
 
 
 def is_real(dtype):
@@ -50,7 +50,8 @@ def number_of(attributes, name, default):
 
 
 STANDARD_NAMES = {"projection_x_coordinate": "x", "projection_y_coordinate": "y", "longitude": "x", "latitude": "y",
-                  "altitude": "z", "height": "z", "depth": "z", "time": TIME, "grid_longitude": "x", "grid_latitude": "y"}
+                  "altitude": "z", "height": "z", "depth": "z", "time": TIME, "forecast_period": TIME, "realization": CHANNEL,
+                  "grid_longitude": "x", "grid_latitude": "y"}
 
 
 def kind_of_dimension(attributes, name):
@@ -68,15 +69,18 @@ def kind_of_dimension(attributes, name):
     return kind if kind in (*SPACE, TIME, CHANNEL, VECTOR) else ""
 
 
-def named_axes(path, names, attributes, shape, options):
+def named_axes(path, names, attributes, shape, options, warnings):
     """The axes of dimensions by --axes, or by their names and the attributes of their coordinates. Dimensions that are not known
-    are those of space that are left, the last ones first."""
-    kinds = [kind_of_dimension(these, name) for these, name in zip(attributes, names)]
-    free = [kind for kind in SPACE if kind not in kinds]
-    for at in reversed(range(len(kinds))):
-        kinds[at] = kinds[at] or (free.pop(0) if free else f"axis{at}")
+    are those of space that are left, the last ones first, with a warning if others are known."""
     if options.axes:
-        kinds = [axis.kind for axis in axes_from_letters(options.axes, shape, path)]
+        return [Axis(axis.kind, axis.size, name) for axis, name in zip(axes_from_letters(options.axes, shape, path), names)]
+    kinds = [kind_of_dimension(these, name) for these, name in zip(attributes, names)]
+    free, is_known = [kind for kind in SPACE if kind not in kinds], bool(set(SPACE) & set(kinds))
+    for at in reversed(range(len(kinds))):
+        if not kinds[at]:
+            kinds[at] = free.pop(0) if free else f"axis{at}"
+            if is_known and kinds[at] in SPACE and shape[at] > 1:
+                warnings.append(f"the axis {names[at]} is taken for {kinds[at]} (--axes names the axes)")
     return [Axis(kind, n, name) for kind, n, name in zip(kinds, shape, names)]
 
 
@@ -94,11 +98,27 @@ def step_of(numbers, attributes, name, warnings):
     return step, float(places[0]), str(attributes.get("units", ""))
 
 
+def candidates(arrays, attributes, coordinates, dataset):
+    """The texts of the arrays of which one may be the image, by their names: those of real numbers that are no coordinates (a set of
+    names) and do not describe others, with three axes, or with two if none has three. --dataset may name any array."""
+    texts = {name: text_of(name, array) for name, array in arrays.items()}
+    if dataset is not None:
+        return texts
+    # Names with a # are what MATLAB keeps for itself.
+    described = {word for these in attributes.values() for name in ("bounds", "coordinates", "grid_mapping")
+                 for word in str(these.get(name, "")).split()}
+    found = {name: array.ndim for name, array in arrays.items() if is_real(array.dtype) and array.ndim >= 2 and array.size and
+             name not in coordinates and not name.startswith("/#") and name.rpartition("/")[2] not in described}
+    return {name: texts[name] for name, count in found.items() if count >= min(3, max(found.values()))}
+
+
 def described_image(format_name, path, names, coordinates, array, attributes, options, block=1):
     """The image of an array whose axes have names ("" where the file does not say) and coordinates (numbers and attributes, or
     None), and whose numbers are packed and missing as the CF conventions say."""
+    if not is_real(array.dtype):
+        raise esvr.BadInput(f"{path}: the array holds {array.dtype}, and images hold real numbers")
     dtype, warnings = np.dtype(array.dtype), []
-    axes = named_axes(path, names, [c[1] if c else {} for c in coordinates], array.shape, options) if all(names) else \
+    axes = named_axes(path, names, [c[1] if c else {} for c in coordinates], array.shape, options, warnings) if all(names) else \
         unnamed_axes(path, array.shape, options)
     steps = [step_of(*coordinate, axis.name, warnings) if coordinate is not None and axis.kind in SPACE else (1.0, 0.0, None)
              for axis, coordinate in zip(axes, coordinates)]
@@ -124,25 +144,19 @@ def described_image(format_name, path, names, coordinates, array, attributes, op
 def missing_by_attributes(attributes, kept, dtype, slope, intercept):
     """Which stored numbers are missing: fill values, and those outside the valid range. kept is the type of the file, and dtype
     the one that _Unsigned makes of it."""
-    def stored(name):
-        numbers = np.ravel(attributes[name])
-        if numbers.dtype.kind == "i" and dtype != kept:
-            numbers = numbers.astype(kept).view(dtype)
-        return numbers
+    def numbers_of(name):
+        numbers = np.ravel(attributes.get(name, []))
+        return numbers.astype(kept).view(dtype) if numbers.dtype.kind == "i" and dtype != kept else numbers
 
-    def limits(name):  # of packed numbers, or of values where the type is that of values
-        numbers = stored(name)
-        return (numbers - intercept) / slope if numbers.dtype.kind == "f" and dtype.kind != "f" else numbers
-
-    values = [number.item() for name in ("_FillValue", "missing_value") if name in attributes and
-              np.ravel(attributes[name]).dtype.kind in "iuf" for number in stored(name)]
+    gone = [number.item() for name in ("_FillValue", "missing_value") for number in numbers_of(name) if number.dtype.kind in "iuf"]
     if dtype.kind == "f" and "_FillValue" not in attributes:
-        values.append(9.969209968386869e36)  # of voxels that were never written
-    low, high = limits("valid_range") if "valid_range" in attributes else (
-        limits(name)[0] if name in attributes else None for name in ("valid_min", "valid_max"))
-    if slope < 0 and dtype.kind != "f" and "valid_range" in attributes and np.ravel(attributes["valid_range"]).dtype.kind == "f":
-        low, high = high, low
-    tests = [missing_if_any(values), low is not None and (lambda numbers: numbers < low),
+        gone.append(9.969209968386869e36)  # of voxels that were never written
+    limits = [numbers_of("valid_range")[k] if "valid_range" in attributes else next(iter(numbers_of(name)), None)
+              for k, name in enumerate(("valid_min", "valid_max"))]
+    if dtype.kind != "f" and any(isinstance(limit, np.floating) for limit in limits):  # of values, and not of packed numbers
+        limits = [None if limit is None else round((limit - intercept) / slope, 6) for limit in limits][::1 if slope > 0 else -1]
+    low, high = limits
+    tests = [missing_if_any(gone), low is not None and (lambda numbers: numbers < low),
              high is not None and (lambda numbers: numbers > high)]
     tests = [test for test in tests if test]
     return (lambda numbers: np.logical_or.reduce([test(numbers) for test in tests])) if tests else None
@@ -150,114 +164,85 @@ def missing_by_attributes(attributes, kept, dtype, slope, intercept):
 
 def coordinates_of(scale):
     """The numbers and attributes of the coordinates of an axis; None if they are none."""
-    return (scale[...], plain(dict(scale.attrs))) if scale is not None and scale.ndim == 1 and scale.dtype.kind in "iuf" else None
+    if scale is None or scale.ndim != 1 or scale.dtype.kind not in "iuf":
+        return None
+    attributes = plain(dict(scale.attrs))
+    is_size = str(attributes.get("NAME", "")).startswith("This is a netCDF dimension but not a netCDF variable")
+    return None if is_size else (scale[...], attributes)
 
 
 # -- HDF5 ----------------------------------------------------------------------------------------------------------
-def hdf5_arrays(h5py, file):
-    found = {}
-
-    def visit(name, item):
-        if isinstance(item, h5py.Dataset) and item.ndim >= 3 and item.size:
-            found[f"/{name}"] = item
-    file.visititems(visit)
-    return found
-
-
 # Formats within HDF5 whose numbers are not values, or whose arrays are larger than the image, by one of their groups.
 HDF5_OTHERS = {"minc-2.0": "MINC", "DataSetInfo": "Imaris", "__DATA_TYPES__": "BigDataViewer", "ITKImage": "ITK"}
 
 
-def read_hdf5(path, options):
-    h5py = need("h5py", "python3-h5py", path, "HDF5")
-    with reading(path, "HDF5"):
-        file = h5py.File(path, "r")
-        for name, program in HDF5_OTHERS.items():
-            if name in file:
-                raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or "
-                                    "OME-TIFF")
-        found = {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items()
-                 if is_real(item.dtype)}
-        if options.dataset and isinstance(file.get(options.dataset), h5py.Dataset):
-            found.setdefault("/" + options.dataset.strip("/"), "")
-        name = choose(path, found, options.dataset, "dataset")
-        dataset = file[name]
-        if not is_real(dataset.dtype):
-            raise esvr.BadInput(f"{path}: the dataset {name} holds {dataset.dtype}, and images hold real numbers")
-        if dataset.chunks is None and dataset.id.get_offset() is not None:
-            require_bytes(path, product(dataset.shape) * dataset.dtype.itemsize, os.path.getsize(path) - dataset.id.get_offset(),
-                          f"the dataset {name}")
-        scales = [dim[0] if len(dim) else None for dim in dataset.dims]
-        names = [dim.label or (scale.name.rpartition("/")[2] if scale is not None else "")
-                 for dim, scale in zip(dataset.dims, scales)]
-        coordinates = [coordinates_of(scale) for scale in scales]
-        for k, coordinate in enumerate(coordinates):
-            if coordinate and str(coordinate[1].get("NAME", "")).startswith("This is a netCDF dimension but not a netCDF variable"):
-                coordinates[k] = None
-        attributes = plain(dataset.attrs)
-        if "axistags" in attributes and not all(names):  # of vigra and ilastik
-            names = [tag["key"] for tag in json.loads(attributes["axistags"])["axes"]]
-        image = described_image("HDF5", path, names, coordinates, dataset, attributes, options,
-                                dataset.chunks[0] if dataset.chunks else 1)
-        sizes = attributes.get("element_size_um")
-        if sizes is not None and np.size(sizes) == 3:
-            image.affine, image.unit = affine_of([abs(float(s)) or 1.0 for s in np.ravel(sizes)[::-1]]), "um"
+def read_hdf5(path, options, format_name="HDF5"):
+    h5py = need("h5py", "python3-h5py", path, format_name)
+    file, arrays = h5py.File(path, "r"), {}
+    for name, program in HDF5_OTHERS.items():
+        if name in file:
+            raise esvr.BadInput(f"{path} is an HDF5 file of {program}, whose description is not read; save it as NIfTI or OME-TIFF")
+    file.visititems(lambda name, item: arrays.update({f"/{name}": item} if isinstance(item, h5py.Dataset) else {}))
+    scales = {name for name, item in arrays.items() if h5py.h5ds.is_scale(item.id)}
+    found = candidates(arrays, {name: plain(item.attrs) for name, item in arrays.items()}, scales, options.dataset)
+    name = choose(path, found, options.dataset, "dataset")
+    dataset = arrays[name]
+    warnings = check_storage(path, name, dataset)
+    scales = [dim[0] if len(dim) else None for dim in dataset.dims]
+    names = [dim.label or (scale.name.rpartition("/")[2] if scale is not None else "") for dim, scale in zip(dataset.dims, scales)]
+    attributes = plain(dataset.attrs)
+    if "axistags" in attributes and not all(names):  # of vigra and ilastik
+        names = [tag["key"] for tag in json.loads(attributes["axistags"])["axes"]]
+    image = described_image(format_name, path, names, [coordinates_of(scale) for scale in scales], dataset, attributes, options,
+                            dataset.chunks[0] if dataset.chunks else 1)
+    sizes = attributes.get("element_size_um")
+    if np.size(sizes) == 3:
+        image.affine, image.unit = affine_of([abs(float(s)) or 1.0 for s in np.ravel(sizes)[::-1]]), "um"
+    image.warnings += warnings
     return image
+
+
+def check_storage(path, name, dataset):
+    """Checks that the numbers are there, since HDF5 takes those that are not for the fill value. Returns warnings."""
+    count = product(dataset.shape) * dataset.dtype.itemsize
+    if dataset.is_virtual:
+        for source in {source.file_name.replace("%b", "0") for source in dataset.virtual_sources() if source.file_name != "."}:
+            if not os.path.exists(os.path.join(os.path.dirname(path), source)):
+                raise esvr.BadInput(f"{path}: the dataset {name} has numbers in another file, {source}, which is missing")
+    elif dataset.external:
+        for other, offset, size in dataset.external:
+            other = os.path.join(os.path.dirname(path), os.fsdecode(other))
+            require_bytes(path, min(size, count), os.path.getsize(other) - offset, f"the dataset {name} in {other}")
+    elif dataset.chunks is None and dataset.id.get_offset() is not None:
+        require_bytes(path, count, os.path.getsize(path) - dataset.id.get_offset(), f"the dataset {name}")
+    elif dataset.chunks is not None:
+        chunks = product(-(-n // chunk) for n, chunk in zip(dataset.shape, dataset.chunks))
+        return missing_chunks(chunks - dataset.id.get_num_chunks(), chunks, dataset.fillvalue)
+    return []
+
+
+def missing_chunks(missing, count, fill):
+    return [f"{missing} of {count} chunks are not stored, and have the fill value {fill}"] if missing > 0 else []
 
 
 # -- netCDF --------------------------------------------------------------------------------------------------------
 def read_netcdf(path, options):
-    netcdf = need("netCDF4", "python3-netcdf4", path, "netCDF")
-    with reading(path, "netCDF"):
-        file = netcdf.Dataset(path)
-        file.set_auto_maskandscale(False)
-        variables, known = {}, set()
-        for prefix, group in netcdf_groups(file, "/"):
-            known |= {prefix + name for name in group.variables}
-            described = {other for v in group.variables.values() for name in ("bounds", "coordinates", "grid_mapping")
-                         if name in v.ncattrs() for other in str(v.getncattr(name)).split()}
-            variables.update({prefix + name: v for name, v in group.variables.items() if is_real(v.dtype) and
-                              name not in v.dimensions and name not in described and v.ndim >= 2})
-        deepest = max([v.ndim for v in variables.values()], default=0)
-        found = {name: text_of(name, v.shape, v.dtype) for name, v in variables.items() if v.ndim >= min(deepest, 3)}
-        if options.dataset:
-            found.update({name: name for name in variables if name == "/" + options.dataset.strip("/")})
-        left_out = netcdf_left_out(path, known)
-        name = choose(path, {**found, **left_out}, options.dataset, "variable")
-        if name in left_out:
-            file.close()
-            options.dataset = name
-            return read_hdf5(path, options)
-        variable, coordinates = file[name], []
-        check_classic(path)
-        for dim in variable.get_dims():
-            scale = dim.group().variables.get(dim.name)
-            fits = scale is not None and scale.ndim == 1 and is_real(scale.dtype) and scale is not variable
-            coordinates.append((scale[:], plain(scale.__dict__)) if fits else None)
-        chunks = variable.chunking()
-        return described_image("netCDF", path, variable.dimensions, coordinates, variable, plain(variable.__dict__), options,
-                               chunks[0] if isinstance(chunks, list) else 1)
-
-
-def netcdf_groups(group, prefix):
-    """The groups of a file with their names."""
-    yield prefix, group
-    for name, child in group.groups.items():
-        yield from netcdf_groups(child, f"{prefix}{name}/")
-
-
-def netcdf_left_out(path, known):
-    """Arrays that the netCDF library does not show, because netCDF has no such type: truth values and complex numbers."""
+    """The classic format; netCDF 4 is HDF5, of which the netCDF library leaves out what its model does not have."""
     with open(path, "rb") as file:
-        if file.read(4) != b"\x89HDF":
-            return {}
-    try:
-        import h5py
-    except ImportError:
-        return {}
-    with h5py.File(path, "r") as file:
-        return {name: text_of(name, item.shape, item.dtype.name) for name, item in hdf5_arrays(h5py, file).items()
-                if name not in known}
+        if file.read(3) != b"CDF":
+            return read_hdf5(path, options, "netCDF")
+    netcdf = need("netCDF4", "python3-netcdf4", path, "netCDF")
+    file = netcdf.Dataset(path)
+    file.set_auto_maskandscale(False)
+    check_classic(path)
+    arrays = {f"/{name}": variable for name, variable in file.variables.items()}
+    found = candidates(arrays, {name: variable.__dict__ for name, variable in arrays.items()},
+                       {name for name, variable in arrays.items() if name[1:] in variable.dimensions}, options.dataset)
+    variable = arrays[choose(path, found, options.dataset, "variable")]
+    scales = [file.variables.get(name) if name != variable.name else None for name in variable.dimensions]
+    coordinates = [(scale[:], plain(scale.__dict__)) if scale is not None and scale.ndim == 1 and is_real(scale.dtype) else None
+                   for scale in scales]
+    return described_image("netCDF", path, variable.dimensions, coordinates, variable, plain(variable.__dict__), options)
 
 
 CLASSIC_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8, 7: 1, 8: 2, 9: 4, 10: 8, 11: 8}
@@ -266,11 +251,10 @@ CLASSIC_SIZES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 4, 6: 8, 7: 1, 8: 2, 9: 4, 10: 8, 11
 def check_classic(path):
     """Checks the length of a file of the classic format, because the library takes what is missing for zeros."""
     with open(path, "rb") as file:
-        magic = file.read(4)
-        if magic[:3] != b"CDF" or magic[3] not in (1, 2, 5):
-            return
+        version = file.read(4)[3]
+        long = version == 5
 
-        def whole(is_long=magic[3] == 5):
+        def whole(is_long=long):
             return struct.unpack(">Q" if is_long else ">I", file.read(8 if is_long else 4))[0]
 
         def skip(count):
@@ -289,18 +273,18 @@ def check_classic(path):
             items(attribute)
             size = CLASSIC_SIZES[whole(False)]
             whole()
-            return shape, size, whole(magic[3] != 1)
+            return shape, size, whole(version != 1)
         records, dimensions = whole(), items(whole)
         items(attribute)
         variables = items(variable)
-        of_records = [product(shape[1:]) * size for shape, size, _ in variables if shape and shape[0] == 0]
-        stride = sum(-(-n // 4) * 4 for n in of_records) if len(of_records) > 1 else sum(of_records)
         end = file.tell()
-        for shape, size, begin in variables:
-            if not shape or shape[0]:
-                end = max(end, begin + product(shape) * size)
-            elif records not in (0, 2 ** 32 - 1, 2 ** 64 - 1):
-                end = max(end, begin + (records - 1) * stride + product(shape[1:]) * size)
+    of_records = [product(shape[1:]) * size for shape, size, _ in variables if shape and shape[0] == 0]
+    stride = sum(-(-n // 4) * 4 for n in of_records) if len(of_records) > 1 else sum(of_records)
+    for shape, size, begin in variables:
+        if not shape or shape[0]:
+            end = max(end, begin + product(shape) * size)
+        elif records not in (0, 2 ** 32 - 1, 2 ** 64 - 1):
+            end = max(end, begin + (records - 1) * stride + product(shape[1:]) * size)
     require_bytes(path, end, os.path.getsize(path), "the file")
 
 
@@ -311,24 +295,24 @@ def is_zarr(folder):
 
 def read_zarr(path, options):
     zarr = need("zarr", "python3-zarr", path, "Zarr")
-    with reading(path, "Zarr"):
-        if os.path.isdir(path):
-            refuse_other_zarr(path)
-        root = zarr.open(zarr.DirectoryStore(path) if os.path.isdir(path) else zarr.ZipStore(path, mode="r"), mode="r")
-        images = {"/": root} if isinstance(root, zarr.Array) else zarr_images(zarr, root)
-        found = {name: text_of(name, item.shape, item.dtype) if isinstance(item, zarr.Array) else f"{name} (OME-Zarr)"
-                 for name, item in images.items()}
-        wanted, level = options.dataset, None
-        if wanted is None and "/" in images:
-            wanted = "/"  # beside an image of OME there may be its labels
-        if wanted is not None and wanted.strip("/") and not any(name.strip("/") == wanted.strip("/") for name in images):
-            parent, _, last = wanted.strip("/").rpartition("/")
-            if "multiscales" in getattr(images.get("/" + parent), "attrs", ()):  # a level of an image of OME
-                wanted, level = "/" + parent, last
-        name = choose(path, found, wanted, "array")
-        image = (ome_zarr if "multiscales" in images[name].attrs else plain_zarr)(zarr, path, images[name], level, options)
-        if len(found) > 1 and options.dataset is None:
-            image.notes.append(f"the file has also: {', '.join(text for other, text in found.items() if other != name)}")
+    if os.path.isdir(path):
+        refuse_other_zarr(path)
+    root = zarr.open(zarr.DirectoryStore(path) if os.path.isdir(path) else zarr.ZipStore(path, mode="r"), mode="r")
+    images = {"/": root} if isinstance(root, zarr.Array) else zarr_images(zarr, root)
+    found = {name: text_of(name, item) if isinstance(item, zarr.Array) else f"{name} (OME-Zarr)"
+             for name, item in images.items()}
+    wanted, level = options.dataset, None
+    if wanted is None and "/" in images:
+        wanted = "/"  # beside an image of OME there may be its labels
+    if wanted is not None and wanted.strip("/") and not any(name.strip("/") == wanted.strip("/") for name in images):
+        parent, _, last = wanted.strip("/").rpartition("/")
+        if "multiscales" in getattr(images.get("/" + parent), "attrs", ()):  # a level of an image of OME
+            wanted, level = "/" + parent, last
+    name = choose(path, found, wanted, "array")
+    image = ome_zarr(path, images[name], level, options) if "multiscales" in images[name].attrs else \
+        plain_zarr(zarr, path, images[name], options)
+    if len(found) > 1 and options.dataset is None:
+        image.notes.append(f"the file has also: {', '.join(text for other, text in found.items() if other != name)}")
     return image
 
 
@@ -356,7 +340,7 @@ def zarr_images(zarr, group, prefix="/"):
     return dict(sorted(found.items()))
 
 
-def plain_zarr(zarr, path, array, level, options):
+def plain_zarr(zarr, path, array, options):
     """An array; xarray names its dimensions, whose coordinates are arrays of their names."""
     names, warnings, attributes = array.attrs.get("_ARRAY_DIMENSIONS") or [], check_chunks(path, array), plain(array.attrs.asdict())
     if len(names) != array.ndim:
@@ -373,7 +357,7 @@ def plain_zarr(zarr, path, array, level, options):
     return image
 
 
-def ome_zarr(zarr, path, group, level, options):
+def ome_zarr(path, group, level, options):
     """A level of an image of OME (versions 0.1 to 0.4), by default the finest one."""
     scales = group.attrs["multiscales"]
     if len(scales) > 1:
@@ -402,9 +386,7 @@ def ome_zarr(zarr, path, group, level, options):
     block = next((n for n, axis in zip(array.chunks, axes) if axis.kind in SPACE), 1)
     image = Image("OME-Zarr", path, axes, array.dtype, array.__getitem__, affine, unit, block=block,
                   warnings=check_chunks(path, array))
-    labels = [str(c.get("label") or "") for c in group.attrs.get("omero", {}).get("channels", [])]
-    if image.axis(CHANNEL) and len(labels) == image.axis(CHANNEL).size and any(labels):
-        image.axis(CHANNEL).labels = labels
+    image.name_channels([str(c.get("label") or "") for c in group.attrs.get("omero", {}).get("channels", [])])
     return image
 
 
@@ -424,7 +406,7 @@ def check_chunks(path, array):
     missing = array.nchunks - stored
     if missing and array.fill_value is None:
         raise esvr.BadInput(f"{path}: {missing} of {array.nchunks} chunks are missing, and no fill value is named")
-    return [f"{missing} of {array.nchunks} chunks are not stored, and have the fill value {array.fill_value}"] if missing > 0 else []
+    return missing_chunks(missing, array.nchunks, array.fill_value)
 
 
 def check_blosc(path, folder):

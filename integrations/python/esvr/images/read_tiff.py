@@ -8,8 +8,8 @@ import numpy as np
 
 import esvr
 
-from .image import CHANNEL, TIME, Axis, Image, affine_of, affine_of_steps, axes_from_letters, by, factor, kind_named, mapped, \
-    missing_if_any, natural, need, planes, product, reading, require_bytes, unit_named
+from .image import (CHANNEL, SPACE, TIME, Axis, Image, affine_of_steps, axes_from_letters, by, kind_named, mapped, missing_if_any,
+                    natural, need, planes, product, reading, require_bytes, unit_named)
 from .program import number_mark
 
 TIFF_AXES = {"X": "x", "Y": "y", "Z": "z", "C": CHANNEL, "S": "sample", "T": TIME, "Q": "page", "I": "page"}
@@ -46,19 +46,25 @@ def files_of_pattern(text):
 
 def read_stack(paths, options):
     """A file for each slice. A file of several slices among them makes one longer stack."""
-    images = [read_tiff(path, options) for path in paths]
+    images = []
+    for path in paths:
+        with reading(path, "TIFF"):
+            images.append(read_tiff(path, options))
     first = images[0]
     if len(images) == 1:
         return first
+
+    def pixels(image):
+        return f"{image.size[0]} x {image.size[1]} pixels of {image.dtype.name}"
+
+    def others(image):
+        return [(a.kind, a.size) for a in image.axes if a.kind != "z"], [f"{n:.6g}" for n in image.affine.flat], image.unit, image.scale
     for image in images[1:]:
-        if image.size[:2] != first.size[:2] or image.dtype != first.dtype:
-            raise esvr.BadInput(f"{image.path} has {image.size[0]} x {image.size[1]} pixels of {image.dtype.name}, and "
-                                f"{first.path} has {first.size[0]} x {first.size[1]} of {first.dtype.name}; slices of one image "
-                                "have one size and type")
-        if [(a.kind, a.size) for a in image.axes if a.kind != "z"] != [(a.kind, a.size) for a in first.axes if a.kind != "z"]:
-            raise esvr.BadInput(f"{image.path} has other axes than {first.path}")
-        if image.scale != first.scale or not np.allclose(image.affine, first.affine) or image.unit != first.unit:
-            raise esvr.BadInput(f"{image.path} has another pixel size or calibration than {first.path}")
+        if pixels(image) != pixels(first):
+            raise esvr.BadInput(f"{image.path} has {pixels(image)}, and {first.path} has {pixels(first)}; slices of one image have one "
+                                "size and type")
+        if others(image) != others(first):
+            raise esvr.BadInput(f"{image.path} has other axes, another pixel size or another calibration than {first.path}")
     slices = [(image, z) for image in images for z in range(image.size[2])]
 
     def read(number, index):
@@ -71,7 +77,7 @@ def read_stack(paths, options):
                   planes([len(slices)], read), first.affine, first.unit, first.scale, first.missing, warnings=first.warnings)
     if first.unit and not any("distance" in text for text in stack.warnings) and first.axis("z") is None:
         stack.warnings.append("the distance of slices is not in the files, and is taken to be the edge of a pixel or 1")
-    if [os.fspath(p) for p in paths] != sorted(map(os.fspath, paths), key=natural):
+    if paths != sorted(paths, key=natural):
         stack.warnings.append("the slices are in the order given, which is not that of the numbers in their names")
     return stack
 
@@ -79,34 +85,33 @@ def read_stack(paths, options):
 # -- one file ------------------------------------------------------------------------------------------------------
 def read_tiff(path, options):
     tifffile = need("tifffile", "python3-tifffile", path, "TIFF")
-    with reading(path, "TIFF"):
-        file = tifffile.TiffFile(path)
-        if "openmicroscopy.org" in (file.pages.first.description or "") and not file.is_ome:
-            raise esvr.BadInput(f"{path}: its OME-XML is damaged")
-        series, number = series_of(path, file, options.dataset)
-        page = next((page.keyframe for page in series.pages if page is not None), file.pages.first)
-        if page.dtype is None:
-            raise esvr.BadInput(f"{path} has {page.bitspersample} bits a sample, in a form that is not read")
-        letters = series.axes
-        if file.is_imagej and not is_scifio(file):
-            letters = imagej_axes(file, letters)
-        elif set(letters) & {"Q", "I"} and "Z" not in letters:
-            letters = letters.replace("Q" if "Q" in letters else "I", "Z", 1)
-        axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
-            Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
-        # What descriptions say of lengths and values. A distance of slices that is not known is None.
-        space = SimpleNamespace(spacing=[1.0, 1.0, 1.0], origin=[0.0, 0.0, 0.0], unit=None, scale=None, labels=[], warnings=[])
-        describe(path, file, file.pages.first, space, number, options)
-        nodata = page.tags.get("GDAL_NODATA")
-        if space.spacing[2] is None:
-            space.spacing[2] = space.spacing[0]
-            if next((axis.size for axis in axes if axis.kind == "z"), 1) > 1:
-                space.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
-        image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine_of(space.spacing, space.origin),
-                      space.unit, space.scale, missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=space.warnings)
-        file.filehandle.close()  # a process may open some 1,000 files, and a stack may have more
-    if image.axis(CHANNEL) and len(space.labels) == image.axis(CHANNEL).size and any(space.labels):
-        image.axis(CHANNEL).labels = space.labels
+    file = tifffile.TiffFile(path)
+    if "openmicroscopy.org" in (file.pages.first.description or "") and not file.is_ome:
+        raise esvr.BadInput(f"{path}: its OME-XML is damaged")
+    series, number = series_of(path, file, options.dataset)
+    page = next((page.keyframe for page in series.pages if page is not None), file.pages.first)
+    if page.dtype is None:
+        raise esvr.BadInput(f"{path} has {page.bitspersample} bits a sample, in a form that is not read")
+    letters = series.axes
+    if file.is_imagej and not is_scifio(file):
+        letters = imagej_axes(file, letters)
+    elif set(letters) & {"Q", "I"} and "Z" not in letters:
+        letters = letters.replace("Q" if "Q" in letters else "I", "Z", 1)
+    axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
+        Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
+    # What descriptions say of lengths (the step, the first place and the unit of x, y, z) and values. A step that is not known is None.
+    said = SimpleNamespace(steps=[[1.0, 0.0, None] for _ in SPACE], scale=None, labels=[], warnings=[])
+    describe(path, file, file.pages.first, said, number, options)
+    if said.steps[2][0] is None:
+        said.steps[2] = [said.steps[0][0], 0.0, said.steps[0][2]]
+        if any(axis.kind == "z" and axis.size > 1 for axis in axes):
+            said.warnings.append("the distance of slices is not in the file, and is taken to be the edge of a pixel")
+    affine, unit = affine_of_steps([Axis(kind, 1) for kind in SPACE], said.steps)
+    nodata = page.tags.get("GDAL_NODATA")
+    image = Image("TIFF", path, axes, page.dtype, pages_of(path, file, series, page), affine, unit, said.scale,
+                  missing_if_any([number_in(nodata.value)]) if nodata else None, warnings=said.warnings)
+    image.name_channels(said.labels)
+    file.filehandle.close()  # a process may open some 1,000 files, and a stack may have more
     return image
 
 
@@ -120,7 +125,7 @@ def series_of(path, file, dataset):
     one."""
     if is_scifio(file):
         return scifio_series(path, file), 0
-    series = [s for s in file.series if s.kind not in ("thumbnail", "label", "macro")]
+    series = [s for s in file.series if s.kind not in ("thumbnail", "label", "macro") and not is_mask(s.keyframe)]
     first = series[0]
     if file.is_ome and first.kind != "ome":
         return ome_series(path, file), 0
@@ -138,9 +143,16 @@ def series_of(path, file, dataset):
         + "; name one by --dataset and its number")
 
 
+def is_mask(page):
+    """Whether the pixels of a page say which pixels of another one are valid."""
+    return page is not None and bool(page.subfiletype & 4)
+
+
 def ome_series(path, file):
     """The planes of OME-XML that has no TiffData, which tifffile takes for a plain stack: they lie in the order of the
     dimensions."""
+    if not ome_pixels(file):
+        raise esvr.BadInput(f"{path} has its OME-XML in another file, which is not read; save it as OME-TIFF with a description of its own")
     pixels = ome_pixels(file)[0]
     slow_first = pixels.get("DimensionOrder", "XYCZT")[:1:-1]
     sizes = {letter: int(pixels.get(f"Size{letter}", 1)) for letter in "CZT"}
@@ -216,14 +228,14 @@ def page_array(path, file, page):
             raise esvr.BadInput(f"{path} has floats in big-endian order with predictor 3, which GDAL decodes wrongly")
         data = gdal.Open(f"GTIFF_DIR:{page.index + 1}:{page.parent.filehandle.path}")
         array = data.ReadAsArray()
-        if array.ndim == 3 and array.shape[0] != page.shape[0]:
+        if array.ndim == 3 and page.keyframe.axes.endswith("S"):
             array = np.moveaxis(array, 0, -1)
     said = page.keyframe.tags.get("Orientation")
     orientation = int(said.value) if said else 1
     if orientation > 4:
         raise esvr.BadInput(f"{path} has the orientation {orientation}, whose rows are columns; this is not read")
-    array = array[::-1] if orientation in (3, 4) else array
-    return array[:, ::-1] if orientation in (2, 3) else array
+    turned = [letter for letter, those in (("Y", (3, 4)), ("X", (2, 3))) if orientation in those]
+    return np.flip(array, [page.keyframe.axes.index(letter) for letter in turned])
 
 
 # -- descriptions --------------------------------------------------------------------------------------------------
@@ -234,36 +246,33 @@ def imagej_axes(file, letters):
     return letters if is_time else letters.replace("T", "Z")
 
 
-def describe(path, file, page, space, number, options):
+def describe(path, file, page, said, number, options):
     if file.is_ome:
-        describe_ome(ome_pixels(file), number, space)
-    elif is_scifio(file):
-        describe_scifio(page.description, space)
-    elif file.is_imagej:
-        describe_resolution(page, space)
-        describe_imagej(path, page.description, space, options)
-    elif file.is_lsm:
-        space.spacing = [abs(float(file.lsm_metadata[f"VoxelSize{axis}"])) or 1.0 for axis in "XYZ"]
-        space.unit = "m"
-    else:
-        describe_resolution(page, space)
-        code = page.tags.get("ResolutionUnit")
-        unit = RESOLUTION_UNITS.get(int(code.value)) if code else None
-        if unit and page.tags.get("XResolution"):
-            space.unit, space.spacing[2] = unit, None
-        else:  # without a unit, resolutions say the ratio of the edges only
-            space.spacing = [1.0, space.spacing[1] / space.spacing[0], 1.0]
-        if page.tags.get("ModelPixelScaleTag"):
-            space.warnings.append("the place on the earth is not read")
-        if page.tags.get("GDAL_METADATA"):
-            describe_gdal(path, str(page.tags["GDAL_METADATA"].value), space)
-
-
-def describe_resolution(page, space):
-    for axis, tag in enumerate(("XResolution", "YResolution")):
+        return describe_ome(ome_pixels(file), number, said)
+    if is_scifio(file):
+        return describe_scifio(page.description, said)
+    if file.is_lsm:
+        said.steps = [[abs(float(file.lsm_metadata[f"VoxelSize{axis}"])) or 1.0, 0.0, "m"] for axis in "XYZ"]
+        return None
+    for step, tag in zip(said.steps, ("XResolution", "YResolution")):
         value = page.tags.get(tag)
         if value and value.value[0] and value.value[1]:
-            space.spacing[axis] = value.value[1] / value.value[0]
+            step[0] = value.value[1] / value.value[0]
+    if file.is_imagej:
+        return describe_imagej(path, page.description, said, options)
+    code = page.tags.get("ResolutionUnit")
+    unit = RESOLUTION_UNITS.get(int(code.value)) if code else None
+    if unit and page.tags.get("XResolution"):
+        said.steps = [[said.steps[0][0], 0.0, unit], [said.steps[1][0], 0.0, unit], [None, 0.0, unit]]
+    else:  # without a unit, resolutions say the ratio of the edges only
+        said.steps[0][0], said.steps[1][0] = 1.0, said.steps[1][0] / said.steps[0][0]
+    if any(is_mask(series.keyframe) for series in file.series):
+        said.warnings.append("the mask of valid pixels is not read")
+    if page.tags.get("ModelPixelScaleTag"):
+        said.warnings.append("the place on the earth is not read")
+    if page.tags.get("GDAL_METADATA"):
+        describe_gdal(path, str(page.tags["GDAL_METADATA"].value), said)
+    return None
 
 
 def lines_of(description):
@@ -272,39 +281,34 @@ def lines_of(description):
     return {key.strip(): value.strip() for key, separator, value in pairs if separator}
 
 
-def describe_imagej(path, description, space, options):
-    said = lines_of(description)
-    space.unit = unit_named(said.get("unit", ""))
-    space.spacing[2] = abs(float(said.get("spacing", 1.0))) or 1.0
-    for column, name in ((1, "yunit"), (2, "zunit")):  # only where they are not that of x
-        if name in said and unit_named(said[name]) != space.unit:
-            if not space.unit or not unit_named(said[name]):
-                raise esvr.BadInput(f"{path} has edges in '{said.get('unit', '')}' and '{said[name]}', of which one is no unit of length")
-            space.spacing[column] *= factor(unit_named(said[name]), space.unit)
-    # The origin of ImageJ is the place of the zero point, counted in voxels.
-    space.origin = [-float(said.get(f"{axis}origin", 0.0)) * step for axis, step in zip("xyz", space.spacing)]
-    calibration = said.get("cf", "20")
-    if calibration == "0" and "c0" in said and "c1" in said:
-        space.scale = (float(said["c1"]), float(said["c0"]))
+def describe_imagej(path, description, said, options):
+    lines = lines_of(description)
+    said.steps[2][0] = abs(float(lines.get("spacing", 1.0))) or 1.0
+    for step, axis in zip(said.steps, SPACE):
+        # The origin of ImageJ is the place of the zero point, counted in voxels; units of y and z are there if they are not that of x.
+        step[1:] = -float(lines.get(f"{axis}origin", 0.0)) * step[0], lines.get(f"{axis}unit", lines.get("unit", ""))
+    units = [unit_named(unit) for _, _, unit in said.steps]
+    if None in units and any(units):
+        raise esvr.BadInput(f"{path} has edges in '{', '.join(unit for _, _, unit in said.steps)}', of which one is no unit of length")
+    calibration = lines.get("cf", "20")
+    if calibration == "0" and "c0" in lines and "c1" in lines:
+        said.scale = (float(lines["c1"]), float(lines["c0"]))
     elif calibration not in ("0", "20") and not options.stored:
         raise esvr.BadInput(f"{path}: the values have a calibration of ImageJ that is no line (cf={calibration}), which is not read; "
                             "--stored takes the stored numbers")
 
 
-def describe_scifio(description, space):
-    said = lines_of(description)
-    names = [name.strip().lower() for name in said["axes"].split(",")]
-    scales, units = said.get("scales", "").split(","), said.get("units", "").split(",")
-    if len(scales) != len(names):
-        return
-    axes = [Axis(kind_named(name), 1) for name in names]
-    numbers = [abs(float(scale)) or 1.0 if scale.strip() not in ("", "null") else 1.0 for scale in scales]
-    units = units if len(units) == len(names) else [None] * len(names)
-    matrix, space.unit = affine_of_steps(axes, [(step, 0.0, unit) for step, unit in zip(numbers, units)])
-    space.spacing = list(np.diag(matrix)[:3])
+def describe_scifio(description, said):
+    lines = lines_of(description)
+    names, scales, units = ([text.strip() for text in lines.get(key, "").split(",")] for key in ("axes", "scales", "units"))
+    if len(scales) == len(names):
+        units = units if len(units) == len(names) else [None] * len(names)
+        steps = {kind_named(name): [abs(float(scale)) or 1.0 if scale not in ("", "null") else 1.0, 0.0, unit]
+                 for name, scale, unit in zip(names, scales, units)}
+        said.steps = [steps.get(kind, [1.0, 0.0, units[0]]) for kind in SPACE]
 
 
-def describe_gdal(path, text, space):
+def describe_gdal(path, text, said):
     """The calibration of GDAL, which must be the same in all bands."""
     found = {}
     for item in tree.fromstring(text.strip("\0 ")).iter("Item"):
@@ -313,7 +317,7 @@ def describe_gdal(path, text, space):
     if any(len(numbers) > 1 for numbers in found.values()):
         raise esvr.BadInput(f"{path} has bands of different calibrations, which are not read")
     if found:
-        space.scale = (*found.get("scale", {1.0}), *found.get("offset", {0.0}))
+        said.scale = (*found.get("scale", {1.0}), *found.get("offset", {0.0}))
 
 
 def local_name(element):
@@ -325,15 +329,10 @@ def ome_pixels(file):
     return [e for e in tree.fromstring(file.ome_metadata).iter() if local_name(e) == "Pixels"]
 
 
-def describe_ome(images, number, space):
+def describe_ome(images, number, said):
     pixels = images[min(number, len(images) - 1)]
-    space.labels = [e.get("Name") or "" for e in pixels if local_name(e) == "Channel"]
-    sizes = [abs(float(pixels.get(f"PhysicalSize{axis}") or 0.0)) for axis in "XYZ"]
-    units = [unit_named(pixels.get(f"PhysicalSize{axis}Unit", "um")) for axis in "XYZ"]
-    if not any(sizes):
-        return
-    if all(unit for size, unit in zip(sizes, units) if size):
-        space.unit = "um"
-        sizes = [size * factor(unit, "um") if size else 0.0 for size, unit in zip(sizes, units)]
-    known = next(size for size in sizes if size)
-    space.spacing = [size or known for size in sizes[:2]] + [sizes[2] or None]
+    said.labels = [e.get("Name") or "" for e in pixels if local_name(e) == "Channel"]
+    steps = [[abs(float(pixels.get(f"PhysicalSize{axis}") or 0.0)), 0.0, pixels.get(f"PhysicalSize{axis}Unit", "um")] for axis in "XYZ"]
+    known = next((step for step in steps if step[0]), None)
+    if known:
+        said.steps = [step if step[0] else list(known) for step in steps[:2]] + [steps[2] if steps[2][0] else [None, 0.0, None]]

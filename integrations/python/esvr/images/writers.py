@@ -13,14 +13,14 @@ import numpy as np
 
 import esvr
 
-from .image import LPS_TO_RAS, need, product
+from .image import LPS, LPS_TO_RAS, need, product
 
 INTEGERS = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64"]
-TYPES = {"NIfTI": INTEGERS + ["float32", "float64"], "NRRD": INTEGERS + ["float32", "float64"],
-         "MetaImage": INTEGERS + ["float32", "float64"], "MRC": ["int8", "int16", "uint16", "float16", "float32"],
-         "TIFF": ["int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"],
-         "netCDF": INTEGERS + ["float32", "float64"], "VTI": INTEGERS + ["float32", "float64"],
-         "NPY": ["bool"] + INTEGERS + ["float16", "float32", "float64"]}
+WIDE = INTEGERS + ["float32", "float64"]
+TYPES = {"NIfTI": WIDE, "NRRD": WIDE, "MetaImage": WIDE, "netCDF": WIDE, "VTI": WIDE, "NPY": ["bool", "float16"] + WIDE,
+         "MRC": ["int8", "int16", "uint16", "float16", "float32"],
+         "TIFF": ["int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"]}
+WITHOUT_VECTORS = {"MRC", "TIFF"}
 
 
 def numbers_text(values):
@@ -69,7 +69,7 @@ NRRD_NAMES = {"int8": "int8", "uint8": "uint8", "float32": "float", "float64": "
 def write_nrrd(path, volume):
     space = volume.metadata.get("image_space")
     matrix = volume.matrix_in(volume.unit)
-    if space == "left-posterior-superior":
+    if space == LPS:
         matrix = LPS_TO_RAS @ matrix
     is_vector = volume.components == 3
     directions = " ".join(f"({','.join(repr(float(n)) for n in matrix[:3, column])})" for column in range(3))
@@ -83,7 +83,7 @@ def write_nrrd(path, volume):
         lines.append("space units: " + " ".join([f'"{volume.unit}"'] * 3))
     if "value_unit" in volume.metadata:
         lines.append(f"sample units: {volume.metadata['value_unit']}")
-    turn = LPS_TO_RAS[:3, :3] if space == "left-posterior-superior" else None
+    turn = LPS_TO_RAS[:3, :3] if space == LPS else None
     volume.save(path, ("\n".join(lines) + "\n\n").encode(), turn=turn)
 
 
@@ -126,8 +126,6 @@ _"""
 # -- formats with axes along those of the world ------------------------------------------------------------------------
 def write_mrc(path, volume):
     mrcfile = need("mrcfile", "python3-mrcfile", volume.out, "MRC")
-    if volume.components != 1:
-        raise esvr.UsageError("MRC has no vectors; choose another format")
     matrix = volume.matrix_in("angstrom")
     spacing = np.linalg.norm(matrix[:3, :3], axis=0)
     angles = [math.degrees(math.acos(np.clip(np.dot(matrix[:3, a], matrix[:3, b]) / (spacing[a] * spacing[b]), -1, 1)))
@@ -137,16 +135,13 @@ def write_mrc(path, volume):
         refuse_matrix("MRC")
     modes = {"int8": 0, "int16": 1, "float32": 2, "uint16": 6, "float16": 12}
     with mrcfile.new_mmap(path, volume.size[::-1], modes[volume.dtype.name], overwrite=True) as file:
-        at = 0
-        for slab in volume.slabs():
-            file.data[at:at + len(slab)] = slab
-            at += len(slab)
+        volume.fill(file.data)
         file.voxel_size = tuple(spacing)
         header = file.header
         header.cellb.alpha, header.cellb.beta, header.cellb.gamma = angles
         header.origin.x, header.origin.y, header.origin.z = matrix[:3, 3]
-        facts = volume.facts
-        header.dmin, header.dmax, header.dmean, header.rms = facts.low, facts.high, facts.mean, facts.deviation
+        header.dmin, header.dmax = (volume.low, volume.high) if volume.low is not None else (0, 0)
+        header.dmean, header.rms = header.dmin - 1, -1  # which means that they are not known
 
 
 def write_netcdf(path, volume):
@@ -173,10 +168,7 @@ def write_netcdf(path, volume):
         variable.set_auto_maskandscale(False)
         if "value_unit" in volume.metadata:
             variable.units = volume.metadata["value_unit"]
-        at = 0
-        for slab in volume.slabs():
-            variable[at:at + len(slab)] = slab
-            at += len(slab)
+        volume.fill(variable)
 
 
 # -- formats without orientation ---------------------------------------------------------------------------------------
@@ -185,8 +177,6 @@ IMAGEJ_UNITS = {"um": "micron", "angstrom": "A"}
 
 def write_tiff(path, volume):
     tifffile = need("tifffile", "python3-tifffile", volume.out, "TIFF")
-    if volume.components != 1:
-        raise esvr.UsageError("vectors are not written as TIFF; choose another format")
     matrix = volume.matrix_in(volume.unit)
     spacing = np.linalg.norm(matrix[:3, :3], axis=0)
     size = product(volume.size) * volume.dtype.itemsize
