@@ -20,5 +20,6 @@ foreach(header ${publicHeaders})
 endforeach()
 
 add_library(check_headers OBJECT EXCLUDE_FROM_ALL ${sources})
+set_target_properties(check_headers PROPERTIES UNITY_BUILD OFF)
 target_compile_features(check_headers PRIVATE cxx_std_20)
 target_include_directories(check_headers PRIVATE libesvr/include)

@@ -252,8 +252,8 @@ bool isSingleFit(const Arguments& a) {
   return a.has("count") || a.has("seconds") || a.has("iterations") || a.has("paper");
 }
 
-/// The goal of each grid; a size replaces it later.
-Goal goalOf(const Arguments& a, const Options& options) {
+/// The goal of all grids without one of their own (Options::gridGoals); a size replaces it later.
+Goal commonGoal(const Arguments& a, const Options& options) {
   if (a.get<bool>("lossless")) return losslessGoal(a);
   requireGridGoals(a, options);
   if (options.maxError) return boundGoal(a, options);
@@ -379,7 +379,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.convert.storage = storageOptions(a);
   readPaper(a, options);
   readSize(a, options);
-  options.convert.goal = goalOf(a, options);
+  options.convert.goal = commonGoal(a, options);
   options.grids.lossless = a.get<bool>("lossless");
   options.convert.representation = representation(a);
   options.convert.effort = effort(a);

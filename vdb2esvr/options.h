@@ -36,10 +36,12 @@ struct Options {
   /// For a frame of a group: the frame before it as a reader gets it; null for the first one.
   const EsvrFile* previous = nullptr;
   WantedGrids grids;
-  bool shares = true;                 ///< grids of a file share what they have in common
-  ConvertOptions convert;             ///< options of every grid; a size replaces the goal
-  std::vector<GridGoal> gridGoals;    ///< goals of single grids instead of that in `convert`
-  std::optional<double> psnr;         ///< PSNR that all other grids should reach, dB over the box
+  bool shares = true;               ///< grids of a file share what they have in common
+  ConvertOptions convert;           ///< options and goal of every grid; a size replaces the goal
+  std::vector<GridGoal> gridGoals;  ///< goals of single grids instead of that in `convert`
+  /// PSNR that all other grids should reach, dB over the box. It is the goal in `convert`, too, but for a
+  /// single fit, which ends when it is reached (convert.fit.psnr).
+  std::optional<double> psnr;
   std::optional<double> picturePsnr;  ///< PSNR of what is seen of grids that are looked through, dB
   std::optional<BoundGoal> maxError;  ///< largest error of all other grids
   std::optional<std::uint64_t> size;  ///< largest size of the file, bytes

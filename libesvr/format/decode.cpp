@@ -212,7 +212,7 @@ class GridDecoder {
     Chunk chunk{record.origin, {}};
     if (record.count == 0 || !wanted(record.box)) return chunk;
     if (grid.quantised.empty())
-      chunk.ellipsoids = readEllipsoids(c, record.count);
+      chunk.ellipsoids = readExact(c, record.count);
     else
       chunk.ellipsoids = readQuantised(c, record.count, grid.quantised[c]);
     refuse(faultOf(chunk.ellipsoids), c);
@@ -221,7 +221,8 @@ class GridDecoder {
     return chunk;
   }
 
-  Ellipsoids readEllipsoids(std::uint32_t c, std::uint64_t count) {
+  /// Ellipsoids in float32, which are stored as they are.
+  Ellipsoids readExact(std::uint32_t c, std::uint64_t count) {
     Ellipsoids e;
     readPlanes(id(SectionKind::kCenters, c), count, e.center);
     readPlanes(id(SectionKind::kScales, c), count, e.logScale);

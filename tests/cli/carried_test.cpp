@@ -7,7 +7,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/io/File.h>
 
 #include <cmath>
 #include <limits>
@@ -22,6 +21,9 @@
 #include "esvr/vdb_io.h"
 #include "support/non_finite.h"
 #include "vdb/foreign_grids.h"
+#include "vdb/open_vdb.h"
+
+#include <openvdb/io/File.h>
 
 namespace esvr {
 namespace {

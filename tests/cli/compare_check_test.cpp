@@ -7,7 +7,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/io/File.h>
 
 #include <cmath>
 #include <filesystem>
@@ -19,6 +18,9 @@
 #include "cli/vdb_inputs.h"
 #include "esvr/vdb_io.h"
 #include "vdb/foreign_grids.h"
+#include "vdb/open_vdb.h"
+
+#include <openvdb/io/File.h>
 
 namespace esvr {
 namespace {

@@ -7,7 +7,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/io/File.h>
 
 #include <filesystem>
 
@@ -20,6 +19,8 @@
 #include "esvr/vdb_io.h"
 #include "vdb/foreign_grids.h"
 #include "vdb/open_vdb.h"
+
+#include <openvdb/io/File.h>
 
 namespace esvr {
 namespace {

@@ -8,7 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/io/File.h>
 
 #include <filesystem>
 #include <limits>
@@ -22,6 +21,8 @@
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 #include "vdb/open_vdb.h"
+
+#include <openvdb/io/File.h>
 
 namespace esvr {
 namespace {

@@ -29,18 +29,6 @@ std::vector<std::vector<float>*> arraysOf(Ellipsoids& e) {
   return arrays;
 }
 
-TEST(Ellipsoids, AreEmptyByDefault) {
-  const Ellipsoids e;
-  EXPECT_EQ(e.size(), 0u);
-  checkInvariants(e);
-  EXPECT_TRUE(wellFormed(e));
-}
-
-TEST(Ellipsoids, PayForAKappaEachOnlyWhenAsked) {
-  EXPECT_TRUE(unitSpheres(3).kappa.empty());
-  EXPECT_EQ(unitSpheres(3, true).kappa.size(), 3u);
-}
-
 TEST(Ellipsoids, AnyArrayOfAnotherLengthIsFound) {
   auto good = unitSpheres(2, true);
   checkInvariants(good);
@@ -81,19 +69,6 @@ TEST(WellFormed, ToleratesRoundingOfAQuaternionButNoMore) {
   EXPECT_FALSE(wellFormed(e));
   for (auto& q : e.rotation) q[0] = 0.0f;
   EXPECT_FALSE(wellFormed(e));
-}
-
-TEST(Field, CountsTheEllipsoidsOfAllItsChunks) {
-  Field field;
-  EXPECT_EQ(field.ellipsoidCount(), 0u);
-  field.chunks = {{{0, 0, 0}, unitSpheres(3)}, {{4096, 0, 0}, {}}, {{8192, 0, 0}, unitSpheres(2)}};
-  EXPECT_EQ(field.ellipsoidCount(), 5u);
-}
-
-TEST(Chunk, CentersAreExactToTwoToTheMinusTwelfthOfAVoxel) {
-  // The header states this: neighbouring float32 numbers just below kChunkExtent differ by 2^-12.
-  const float extent = float(kChunkExtent);
-  EXPECT_EQ(extent - std::nextafter(extent, 0.0f), 0x1p-12f);
 }
 
 }  // namespace

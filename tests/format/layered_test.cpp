@@ -160,9 +160,9 @@ TEST_F(PartOfAFile, DamagedInABlockIsRefusedWhereTheBlockIsRead) {
 }
 
 /// Offsets in the section (docs/format.md, "Layered ellipsoids"), without rotation thresholds.
-namespace at {
+namespace directory_at {
 constexpr std::size_t kSize = 0, kCount = 4, kCell = 12, kThresholds = 78, kLayers = 79;
-}  // namespace at
+}  // namespace directory_at
 
 /// The content with a corrected checksum of its directory.
 std::vector<std::byte> repaired(std::vector<std::byte> content) {
@@ -175,7 +175,7 @@ std::vector<std::byte> repaired(std::vector<std::byte> content) {
 }
 
 template <class T>
-void expectLie(std::size_t offset, T value, const char* answer) {
+void expectDirectoryLie(std::size_t offset, T value, const char* answer) {
   CraftedFile file(encodeEsvr(layeredFile(20)));
   file.poke(SectionKind::kLayered, offset, value);
   file.setContent(SectionKind::kLayered, repaired(file.content(SectionKind::kLayered)));
@@ -186,29 +186,29 @@ void expectLie(std::size_t offset, T value, const char* answer) {
 /// The offset of the number of layers, which follows the thresholds.
 std::size_t layersAt() {
   CraftedFile file(encodeEsvr(layeredFile(20)));
-  return at::kLayers +
-         std::to_integer<std::size_t>(file.content(SectionKind::kLayered)[at::kThresholds]);
+  return directory_at::kLayers + std::to_integer<std::size_t>(file.content(
+                                     SectionKind::kLayered)[directory_at::kThresholds]);
 }
 
 TEST(LayeredLies, AreFoundOut) {
   const std::size_t layers = layersAt(), ends = layers + 1;
   const std::size_t entries = ends + 4 * sizeof(std::uint64_t);
-  expectLie(at::kSize, std::uint32_t{11}, "a directory of 11 bytes");
-  expectLie(at::kSize, 0xffffffffu, "a directory of");
-  expectLie(at::kCount, std::uint64_t{21}, "with 21 ellipsoids for 20");
-  expectLie(at::kCell, 0.0, "the cell of the lattice");
-  expectLie(layers, std::uint8_t{3}, "lie.esvr");
-  expectLie(layers, std::uint8_t{0}, "not those of the chunk");
-  expectLie(ends, std::uint64_t{0}, "a layer is empty");
-  expectLie(ends, std::uint64_t{1} << 60, "a layer is empty or beyond");
-  expectLie(entries, std::uint8_t{255}, "lie.esvr");
-  expectLie(entries + 6, 0xffffffffu, "do not lie in the section");
-  expectLie(entries + 22, std::uint64_t{1}, "checksum of a block");
+  expectDirectoryLie(directory_at::kSize, std::uint32_t{11}, "a directory of 11 bytes");
+  expectDirectoryLie(directory_at::kSize, 0xffffffffu, "a directory of");
+  expectDirectoryLie(directory_at::kCount, std::uint64_t{21}, "with 21 ellipsoids for 20");
+  expectDirectoryLie(directory_at::kCell, 0.0, "the cell of the lattice");
+  expectDirectoryLie(layers, std::uint8_t{3}, "lie.esvr");
+  expectDirectoryLie(layers, std::uint8_t{0}, "not those of the chunk");
+  expectDirectoryLie(ends, std::uint64_t{0}, "a layer is empty");
+  expectDirectoryLie(ends, std::uint64_t{1} << 60, "a layer is empty or beyond");
+  expectDirectoryLie(entries, std::uint8_t{255}, "lie.esvr");
+  expectDirectoryLie(entries + 6, 0xffffffffu, "do not lie in the section");
+  expectDirectoryLie(entries + 22, std::uint64_t{1}, "checksum of a block");
 }
 
 TEST(LayeredLies, ADirectoryThatIsDamagedIsNamed) {
   CraftedFile file(encodeEsvr(layeredFile(20)));
-  file.poke(SectionKind::kLayered, at::kCell, 3.0);
+  file.poke(SectionKind::kLayered, directory_at::kCell, 3.0);
   EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "f"); },
               ThrowsMessage<BadInput>(HasSubstr("checksum of the directory")));
 }
@@ -216,7 +216,7 @@ TEST(LayeredLies, ADirectoryThatIsDamagedIsNamed) {
 TEST(LayeredLies, AKilobyteCannotAskForAGigabyte) {
   for (std::uint64_t count = std::uint64_t{1} << 62; count > 20; count /= 2) {
     CraftedFile file(encodeEsvr(layeredFile(20)));
-    file.poke(SectionKind::kLayered, at::kCount, count);
+    file.poke(SectionKind::kLayered, directory_at::kCount, count);
     file.setContent(SectionKind::kLayered, repaired(file.content(SectionKind::kLayered)));
     file.poke(SectionKind::kChunks, 36, count);
     const auto bytes = file.assemble();

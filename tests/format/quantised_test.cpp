@@ -18,7 +18,7 @@ using test::CraftedFile;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr std::size_t kMegabyte = 1 << 20;
+constexpr std::size_t kMebibyte = 1 << 20;
 
 EsvrFile quantisedFile(std::size_t n) { return test::fileOf(test::quantisedGrid(n)); }
 
@@ -76,15 +76,15 @@ TEST(QuantisedFile, ManyAlikeArePaddedToWhatAReaderBelieves) {
 }
 
 /// Offsets in the section (docs/format.md, "Quantised ellipsoids").
-namespace at {
+namespace quantised_at {
 constexpr std::size_t kCount = 0, kCell = 8, kScaleStep = 28, kIntensityStep = 40,
                       kPositionBase = 48, kCellBits = 72, kSigns = 73, kThresholds = 74;
-}  // namespace at
+}  // namespace quantised_at
 /// Offset of the number of ellipsoids in a chunk record.
 constexpr std::size_t kCountInChunk = 36;
 
 template <class T>
-void expectLie(std::size_t offset, T value, const char* answer) {
+void expectQuantisedLie(std::size_t offset, T value, const char* answer) {
   CraftedFile file(encodeEsvr(quantisedFile(5)));
   file.poke(SectionKind::kEllipsoids, offset, value);
   EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "lie.esvr"); },
@@ -93,16 +93,16 @@ void expectLie(std::size_t offset, T value, const char* answer) {
 
 TEST(QuantisedLies, AreFoundOut) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  expectLie(at::kCount, std::uint64_t{6}, "with 6 ellipsoids for 5");
-  expectLie(at::kCell, 0.0, "the cell of the lattice");
-  expectLie(at::kCell, nan, "the cell of the lattice");
-  expectLie(at::kScaleStep, -1.0, "the step of scales");
-  expectLie(at::kScaleStep, 1e300, "finite");
-  expectLie(at::kIntensityStep, HUGE_VAL, "the step of intensities");
-  expectLie(at::kPositionBase, 1 << 30, "the base of positions");
-  expectLie(at::kCellBits, std::uint8_t{21}, "too many cells");
-  expectLie(at::kSigns, std::uint8_t{2}, "mark of signs");
-  expectLie(at::kThresholds, std::uint8_t{255}, "lie.esvr");
+  expectQuantisedLie(quantised_at::kCount, std::uint64_t{6}, "with 6 ellipsoids for 5");
+  expectQuantisedLie(quantised_at::kCell, 0.0, "the cell of the lattice");
+  expectQuantisedLie(quantised_at::kCell, nan, "the cell of the lattice");
+  expectQuantisedLie(quantised_at::kScaleStep, -1.0, "the step of scales");
+  expectQuantisedLie(quantised_at::kScaleStep, 1e300, "finite");
+  expectQuantisedLie(quantised_at::kIntensityStep, HUGE_VAL, "the step of intensities");
+  expectQuantisedLie(quantised_at::kPositionBase, 1 << 30, "the base of positions");
+  expectQuantisedLie(quantised_at::kCellBits, std::uint8_t{21}, "too many cells");
+  expectQuantisedLie(quantised_at::kSigns, std::uint8_t{2}, "mark of signs");
+  expectQuantisedLie(quantised_at::kThresholds, std::uint8_t{255}, "lie.esvr");
 }
 
 TEST(QuantisedLies, AMissingSectionIsNamed) {
@@ -124,7 +124,7 @@ TEST(QuantisedLies, AKilobyteCannotAskForAGigabyte) {
     CraftedFile file(encodeEsvr(quantisedFile(5)));
     file.poke(SectionKind::kChunks, kCountInChunk, count);
     EXPECT_THROW((void)decodeEsvr(file.assemble(), "lie"), BadInput) << count;
-    file.poke(SectionKind::kEllipsoids, at::kCount, count);
+    file.poke(SectionKind::kEllipsoids, quantised_at::kCount, count);
     const auto bytes = file.assemble();
     ASSERT_LT(bytes.size(), 2048u);
     const test::AllocationMeter meter;
@@ -132,7 +132,7 @@ TEST(QuantisedLies, AKilobyteCannotAskForAGigabyte) {
       (void)decodeEsvr(bytes, "lie");
     } catch (const BadInput&) {
     }
-    EXPECT_LT(meter.bytes(), 32 * kMegabyte) << count;
+    EXPECT_LT(meter.bytes(), 32 * kMebibyte) << count;
   }
 }
 

@@ -375,11 +375,14 @@ TEST_F(SequenceFile, IsResumedAfterAnyByte) {
     for (const auto& group : kGroups) append(writer, group), writer.endGroup();
   }
   const auto left = bytesIn(partial());
-  // Each byte where the number of complete groups changes, and some of the others.
-  constexpr std::size_t kStride = 23;
+  // The bytes on both sides of each change of the number of complete groups, and some of the others.
+  constexpr std::size_t kStride = 61;
   const auto next = [&](std::size_t n) {
     const std::size_t far = std::min(n + kStride, left.size());
-    return n < far && complete[far] == complete[n] ? far : n + 1;
+    if (n == far) return n + 1;
+    std::size_t last = far;  // before a change
+    while (complete[last] != complete[n]) --last;
+    return last == n ? n + 1 : last;
   };
   for (std::size_t n = 0; n <= left.size(); n = next(n)) {
     test::writeBytes(partial(), {left.begin(), left.begin() + std::ptrdiff_t(n)});

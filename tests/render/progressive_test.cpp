@@ -17,12 +17,12 @@
 namespace esvr::test {
 namespace {
 
-constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+constexpr Box kShownBox{{0, 0, 0}, {39, 39, 39}};
 
 RenderOptions options(Resolution resolution = {96, 64}) {
   RenderOptions o;
   o.resolution = resolution;
-  o.camera = fitCamera(kBox, {}, resolution);
+  o.camera = fitCamera(kShownBox, {}, resolution);
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
   o.opacityLength = 20.0;
   return o;

@@ -19,13 +19,13 @@
 namespace esvr::test {
 namespace {
 
-constexpr double kAsked = 80.0, kAskedByThreshold = 70.0;
-constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+constexpr double kAskedOfCells = 80.0, kAskedByThreshold = 70.0;
+constexpr Box kCellsBox{{0, 0, 0}, {39, 39, 39}};
 
-RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
+RenderOptions cellOptions(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
   RenderOptions o;
   o.resolution = resolution;
-  o.camera = fitCamera(kBox, wish, resolution);
+  o.camera = fitCamera(kCellsBox, wish, resolution);
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
   o.opacityLength = 8.0;
   return o;
@@ -33,7 +33,8 @@ RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {5
 
 CameraWish orthographic() { return {.projection = Projection::kOrthographic}; }
 
-double agreement(const Field& field, const RenderOptions& o, const RevoxeliseOptions& rule = {}) {
+double voxelAgreement(const Field& field, const RenderOptions& o,
+                      const RevoxeliseOptions& rule = {}) {
   const Image drawn = renderField(field, o, rule);
   double light = 0.0;
   for (const float v : drawn.rgba) light += v;
@@ -44,63 +45,68 @@ double agreement(const Field& field, const RenderOptions& o, const RevoxeliseOpt
 TEST(RenderCells, DrawsTheVoxelsPictureFromEveryDirection) {
   const Field field = randomField({.count = 200});
   for (int turn = 0; turn < 8; ++turn) {
-    RenderOptions o = optionsFor();
+    RenderOptions o = cellOptions();
     o.camera = turned(o.camera, 45.0 * turn + 3.0);
-    EXPECT_GE(agreement(field, o), kAsked) << turn;
-    o.camera = turned(optionsFor(orthographic()).camera, 45.0 * turn);
-    EXPECT_GE(agreement(field, o), kAsked) << turn << ", along an axis and across";
+    EXPECT_GE(voxelAgreement(field, o), kAskedOfCells) << turn;
+    o.camera = turned(cellOptions(orthographic()).camera, 45.0 * turn);
+    EXPECT_GE(voxelAgreement(field, o), kAskedOfCells) << turn << ", along an axis and across";
   }
   for (const Vec3 eye : {Vec3{20, 150, 20}, Vec3{20, -110, 20}})
-    EXPECT_GE(agreement(field, optionsFor({.eye = eye, .up = Vec3{0, 0, 1}})), kAsked);
+    EXPECT_GE(voxelAgreement(field, cellOptions({.eye = eye, .up = Vec3{0, 0, 1}})), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureFromInside) {
   for (const double fov : {80.0, 170.0}) {
     const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = fov};
-    EXPECT_GE(agreement(randomField({.count = 200}), optionsFor(inside)), kAsked) << fov;
+    EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(inside)), kAskedOfCells)
+        << fov;
   }
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureFromFarAway) {
   CameraWish far{.eye = Vec3{1e6, 2e6, 3.3e6}, .center = Vec3{20, 20, 20}};
   far.fov = 2.0 * std::atan(30.0 / 4e6) * 180.0 / 3.14159265358979;
-  EXPECT_GE(agreement(randomField({.count = 200}), optionsFor(far)), kAsked);
+  EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(far)), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureAtEveryStep) {
   const Field field = randomField({.count = 200});
   for (const double step : {0.1, 0.5, 1.0, 2.5, 7.0}) {
-    RenderOptions o = optionsFor();
+    RenderOptions o = cellOptions();
     o.step = step;
-    EXPECT_GE(agreement(field, o), kAsked) << step;
+    EXPECT_GE(voxelAgreement(field, o), kAskedOfCells) << step;
   }
-  RenderOptions o = optionsFor();
+  RenderOptions o = cellOptions();
   o.step = 60.0;  // most rays have one sample in the volume
   o.transfer.opacity = {{0.0, 0.5}};
   o.opacityLength = 60.0;
-  EXPECT_GE(agreement(randomField({.count = 2000}), o), kAsked);
+  EXPECT_GE(voxelAgreement(randomField({.count = 2000}), o), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureAtEveryZoom) {
   const Field field = randomField({.count = 200});
   for (const double times : {0.02, 0.3, 2.0, 10.0, 100.0}) {
-    RenderOptions o = optionsFor(orthographic());
+    RenderOptions o = cellOptions(orthographic());
     o.camera.height *= times;
     // Samples may lie exactly at voxels here. Rounding then decides whether a sample beside a voxel
     // of the background is empty, which must not matter.
     o.transfer.opacity = {{-1.0, 1.0}, {0.0, 0.0}, {1.0, 1.0}};
-    EXPECT_GE(imagePsnr(renderVolume(revoxelise(field, {}), o), renderField(field, o)), kAsked)
+    EXPECT_GE(imagePsnr(renderVolume(revoxelise(field, {}), o), renderField(field, o)),
+              kAskedOfCells)
         << times;
   }
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
-  EXPECT_GE(agreement(randomField({.count = 4000, .smallest = 0.15, .aspect = 3.0}), optionsFor()),
-            kAsked);
-  EXPECT_GE(agreement(randomField({.count = 200, .smallest = 0.1, .aspect = 200.0}), optionsFor()),
-            kAsked);
+  EXPECT_GE(
+      voxelAgreement(randomField({.count = 4000, .smallest = 0.15, .aspect = 3.0}), cellOptions()),
+      kAskedOfCells);
+  EXPECT_GE(
+      voxelAgreement(randomField({.count = 200, .smallest = 0.1, .aspect = 200.0}), cellOptions()),
+      kAskedOfCells);
   for (const float kappa : {-3.0f, 0.0f, 12.0f})
-    EXPECT_GE(agreement(randomField({.count = 100, .kappa = kappa}), optionsFor()), kAsked)
+    EXPECT_GE(voxelAgreement(randomField({.count = 100, .kappa = kappa}), cellOptions()),
+              kAskedOfCells)
         << kappa;
 }
 
@@ -108,7 +114,7 @@ TEST(RenderCells, DrawsOneEllipsoidThatCoversEverything) {
   // The error is that of float32 at distances of hundreds of voxels: 1e-5.
   Field field = randomField({.count = 1, .smallest = 60.0, .aspect = 1.5});
   field.chunks[0].ellipsoids.intensity[0] = 0.3f;
-  EXPECT_GE(agreement(field, optionsFor()), kAsked);
+  EXPECT_GE(voxelAgreement(field, cellOptions()), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsABackgroundSeveralChunksAndKappas) {
@@ -119,15 +125,17 @@ TEST(RenderCells, DrawsABackgroundSeveralChunksAndKappas) {
   field.chunks[0].ellipsoids.kappa.assign(20, 1.0f);
   field.chunks[0].ellipsoids.kappa[3] = 20.0f;
   field.chunks[1].ellipsoids.kappa.assign(20, 4.0f);
-  EXPECT_GE(agreement(field, optionsFor()), kAsked);
+  EXPECT_GE(voxelAgreement(field, cellOptions()), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsByTheRuleOfTheVoxels) {
   const Field field = randomField({.count = 200});
-  EXPECT_GE(agreement(field, optionsFor(), {.threshold = 0.2f}), kAskedByThreshold);
-  EXPECT_GE(agreement(field, optionsFor(), {.range = ValueRange{-0.3f, 0.4f}}), kAsked);
-  EXPECT_GE(agreement(field, optionsFor(), {.tone = {0.1f}, .range = ValueRange{-1.0f, 1.0f}}),
-            kAsked);
+  EXPECT_GE(voxelAgreement(field, cellOptions(), {.threshold = 0.2f}), kAskedByThreshold);
+  EXPECT_GE(voxelAgreement(field, cellOptions(), {.range = ValueRange{-0.3f, 0.4f}}),
+            kAskedOfCells);
+  EXPECT_GE(
+      voxelAgreement(field, cellOptions(), {.tone = {0.1f}, .range = ValueRange{-1.0f, 1.0f}}),
+      kAskedOfCells);
 }
 
 // Half of the voxels of each brick are in its mask, and the box cuts through bricks. All voxels of
@@ -142,13 +150,13 @@ TEST(RenderCells, DrawsTheVoxelsOfMasksWithinABox) {
       if ((v + int(b)) % 16 < 8) masks[b].set(v);
   const RevoxeliseOptions boxed{.box = box},
       masked{.bricks = bricks, .restrictToBricks = true, .masks = masks, .box = box};
-  RenderOptions far = optionsFor();
+  RenderOptions far = cellOptions();
   far.resolution = {20, 15};
   far.camera = fitCamera({{-20, -20, -20}, {60, 60, 60}}, {}, far.resolution);
   for (const RevoxeliseOptions& rule : {boxed, masked}) {
-    EXPECT_GE(agreement(field, optionsFor(), rule), kAsked);
-    EXPECT_GE(agreement(field, far, rule), kAsked) << "means of coarser levels";
-    EXPECT_LT(imagePsnr(renderField(field, optionsFor(), rule), renderField(field, optionsFor())),
+    EXPECT_GE(voxelAgreement(field, cellOptions(), rule), kAskedOfCells);
+    EXPECT_GE(voxelAgreement(field, far, rule), kAskedOfCells) << "means of coarser levels";
+    EXPECT_LT(imagePsnr(renderField(field, cellOptions(), rule), renderField(field, cellOptions())),
               40.0);
   }
 }
@@ -160,9 +168,9 @@ TEST(RenderCells, DrawsVoxelsThatAreAlwaysActive) {
   const RevoxeliseOptions none{.threshold = 100.0f};
   RevoxeliseOptions some = none;
   some.alwaysActive = always;
-  EXPECT_GE(agreement(field, optionsFor(), some), kAskedByThreshold);
+  EXPECT_GE(voxelAgreement(field, cellOptions(), some), kAskedByThreshold);
   EXPECT_LT(
-      imagePsnr(renderField(field, optionsFor(), some), renderField(field, optionsFor(), none)),
+      imagePsnr(renderField(field, cellOptions(), some), renderField(field, cellOptions(), none)),
       60.0);
 }
 
@@ -180,22 +188,22 @@ TEST(RenderCells, DrawsEllipsoidsThatLieFarApart) {
   const auto renderer = makeFieldRenderer(field, Device{});
   for (const std::size_t i : {0u, 17u, 59u}) {
     const Vec3 puff{e.center[0][i], e.center[1][i], e.center[2][i]};
-    RenderOptions o = optionsFor();
+    RenderOptions o = cellOptions();
     o.camera.center = puff, o.camera.eye = {puff[0] + 10.0, puff[1] + 30.0, puff[2] + 60.0};
     const Image expected = renderVolume(volume, o), drawn = renderer->draw(o);
-    EXPECT_GE(imagePsnr(expected, drawn), kAsked);
+    EXPECT_GE(imagePsnr(expected, drawn), kAskedOfCells);
     EXPECT_GT(drawn.rgba[4 * (18 * 50 + 25) + 3], 0.1f) << "the puff in the middle";
     o.between = Between::kSum;
     EXPECT_GE(imagePsnr(expected, renderer->draw(o)), 20.0) << "roughly";
   }
-  RenderOptions all = optionsFor();
+  RenderOptions all = cellOptions();
   all.camera = fitCamera(activeBox(volume), {}, all.resolution);
-  EXPECT_GE(imagePsnr(renderVolume(volume, all), renderer->draw(all)), kAsked);
+  EXPECT_GE(imagePsnr(renderVolume(volume, all), renderer->draw(all)), kAskedOfCells);
 }
 
 TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
-  const RenderOptions o = optionsFor({}, {130, 70});
+  const RenderOptions o = cellOptions({}, {130, 70});
   const auto draw = [&] { return renderField(field, o).rgba; };
   const auto one = onThreads(1, draw);
   EXPECT_EQ(one, onThreads(2, draw));
@@ -203,9 +211,9 @@ TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(RenderCells, NothingToSeeIsTransparent) {
-  const auto away = optionsFor({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}});
+  const auto away = cellOptions({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}});
   for (const float v : renderField(randomField({}), away).rgba) ASSERT_EQ(v, 0.0f);
-  for (const float v : renderField(Field{}, optionsFor()).rgba) ASSERT_EQ(v, 0.0f);
+  for (const float v : renderField(Field{}, cellOptions()).rgba) ASSERT_EQ(v, 0.0f);
 }
 
 /// A short fit, in which many ellipsoids are smaller than a voxel.

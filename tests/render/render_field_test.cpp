@@ -32,8 +32,8 @@
 namespace esvr::test {
 namespace {
 
-constexpr double kAsked = 70.0;
-constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+constexpr double kAskedOfSums = 70.0;
+constexpr Box kFieldBox{{0, 0, 0}, {39, 39, 39}};
 
 // Pictures.
 
@@ -41,18 +41,18 @@ TransferFunction viridis(ValueRange range = {-1.0f, 1.0f}) {
   return rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, range);
 }
 
-RenderOptions optionsFor(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
+RenderOptions sumOptions(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
   RenderOptions o;
   o.resolution = resolution;
-  o.camera = fitCamera(kBox, wish, resolution);
+  o.camera = fitCamera(kFieldBox, wish, resolution);
   o.transfer = viridis();
   o.opacityLength = 8.0;
   o.between = Between::kSum;
   return o;
 }
 
-double agreement(const Field& field, const RenderOptions& o,
-                 const std::optional<ValueRange>& range = std::nullopt, ToneCurve tone = {}) {
+double sumAgreement(const Field& field, const RenderOptions& o,
+                    const std::optional<ValueRange>& range = std::nullopt, ToneCurve tone = {}) {
   const double farthest = length(difference(o.camera.eye, o.camera.center)) + 100.0;
   const auto clamped = [&, sum = sumOfEllipsoids(field)](const Vec3& place) {
     const double s = tone.scale;
@@ -68,35 +68,36 @@ double agreement(const Field& field, const RenderOptions& o,
 }
 
 TEST(RenderField, AgreesWithTheReferenceInPerspective) {
-  EXPECT_GE(agreement(randomField({}), optionsFor()), kAsked);
+  EXPECT_GE(sumAgreement(randomField({}), sumOptions()), kAskedOfSums);
 }
 
 TEST(RenderField, AgreesWithTheReferenceInOrthographicProjection) {
-  EXPECT_GE(agreement(randomField({}), optionsFor({.projection = Projection::kOrthographic})),
-            kAsked);
+  EXPECT_GE(sumAgreement(randomField({}), sumOptions({.projection = Projection::kOrthographic})),
+            kAskedOfSums);
 }
 
 TEST(RenderField, AgreesWithACameraInsideTheVolume) {
   const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
-  EXPECT_GE(agreement(randomField({}), optionsFor(inside)), kAsked);
+  EXPECT_GE(sumAgreement(randomField({}), sumOptions(inside)), kAskedOfSums);
   CameraWish flat = inside;
   flat.projection = Projection::kOrthographic;
-  EXPECT_GE(agreement(randomField({}), optionsFor(flat)), kAsked);
+  EXPECT_GE(sumAgreement(randomField({}), sumOptions(flat)), kAskedOfSums);
 }
 
 TEST(RenderField, SlowClampsSumsToTheRangeOfTheVoxels) {
   Field field = randomField({.count = 300});
   field.background = 0.125f;
-  EXPECT_GE(agreement(field, optionsFor(), ValueRange{-0.25f, 0.5f}), kAsked);
+  EXPECT_GE(sumAgreement(field, sumOptions(), ValueRange{-0.25f, 0.5f}), kAskedOfSums);
 }
 
 TEST(RenderField, SlowDrawsTheValuesOfTones) {
   const Field field = randomField({.count = 300});
-  EXPECT_GE(agreement(field, optionsFor(), ValueRange{-1.0f, 1.0f}, {0.1f}), kAsked);
+  EXPECT_GE(sumAgreement(field, sumOptions(), ValueRange{-1.0f, 1.0f}, {0.1f}), kAskedOfSums);
 }
 
 TEST(RenderField, AgreesForNeedlesAndPancakes) {
-  EXPECT_GE(agreement(randomField({.smallest = 0.1, .aspect = 200.0}), optionsFor()), kAsked);
+  EXPECT_GE(sumAgreement(randomField({.smallest = 0.1, .aspect = 200.0}), sumOptions()),
+            kAskedOfSums);
 }
 
 TEST(RenderField, AgreesForANeedleAlongTheViewRay) {
@@ -106,31 +107,32 @@ TEST(RenderField, AgreesForANeedleAlongTheViewRay) {
   for (int a = 0; a < 4; ++a) e.rotation[a][0] = a == 0 ? 1.0f : 0.0f;
   e.logScale[0][0] = e.logScale[1][0] = std::log(0.4f), e.logScale[2][0] = std::log(15.0f);
   e.intensity[0] = 1.0f;
-  RenderOptions o = optionsFor({.eye = Vec3{20, 20, 120}, .center = Vec3{20, 20, 20}}, {51, 51});
+  RenderOptions o = sumOptions({.eye = Vec3{20, 20, 120}, .center = Vec3{20, 20, 20}}, {51, 51});
   o.transfer = viridis({0.0f, 1.0f});
-  EXPECT_GE(agreement(field, o), kAsked);
+  EXPECT_GE(sumAgreement(field, o), kAskedOfSums);
 }
 
 TEST(RenderField, AgreesForOneEllipsoidThatCoversEverything) {
   Field field = randomField({.count = 1, .smallest = 300.0});
   field.chunks[0].ellipsoids.intensity[0] = 0.3f;
-  EXPECT_GE(agreement(field, optionsFor()), kAsked);
+  EXPECT_GE(sumAgreement(field, sumOptions()), kAskedOfSums);
 }
 
 TEST(RenderField, AgreesForEachKernel) {
   for (const float kappa : {-3.0f, 0.0f, 12.0f})
-    EXPECT_GE(agreement(randomField({.kappa = kappa}), optionsFor({}, {25, 18})), kAsked) << kappa;
+    EXPECT_GE(sumAgreement(randomField({.kappa = kappa}), sumOptions({}, {25, 18})), kAskedOfSums)
+        << kappa;
   Field field = randomField({.count = 15, .kappa = 5.0f});
   field.chunks[0].ellipsoids.kappa.assign(15, 1.0f);
   field.chunks[0].ellipsoids.kappa[3] = 20.0f;
-  EXPECT_GE(agreement(field, optionsFor()), kAsked) << "a kappa of its own each";
+  EXPECT_GE(sumAgreement(field, sumOptions()), kAskedOfSums) << "a kappa of its own each";
 }
 
 TEST(RenderField, AgreesForOtherSteps) {
   for (const double step : {0.3, 2.5}) {
-    RenderOptions o = optionsFor({}, {25, 18});
+    RenderOptions o = sumOptions({}, {25, 18});
     o.step = step;
-    EXPECT_GE(agreement(randomField({}), o), kAsked) << step;
+    EXPECT_GE(sumAgreement(randomField({}), o), kAskedOfSums) << step;
   }
 }
 
@@ -139,7 +141,7 @@ TEST(RenderField, AgreesWithABackgroundAndSeveralChunks) {
   field.background = 0.25f;
   field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
   field.chunks[1].origin = {16, -8, 8};
-  EXPECT_GE(agreement(field, optionsFor()), kAsked);
+  EXPECT_GE(sumAgreement(field, sumOptions()), kAskedOfSums);
 }
 
 TEST(RenderField, FarCamerasLoseNothing) {
@@ -148,7 +150,7 @@ TEST(RenderField, FarCamerasLoseNothing) {
   const Vec3 away{1e6, 2e6, 3.3e6};
   CameraWish wish{.eye = sum(away, {20, 20, 20}), .center = Vec3{20, 20, 20}};
   wish.fov = 2.0 * std::atan(30.0 / length(away)) * 180.0 / 3.14159265358979;
-  RenderOptions o = optionsFor(wish, {20, 20});
+  RenderOptions o = sumOptions(wish, {20, 20});
   const Vec3 forward = unit(difference(o.camera.center, o.camera.eye));
   // The reference takes samples from 0 on. A plane that is nearer by a whole number of steps has
   // the same samples, if the rays hardly diverge: here by at most 70 / 4e6 over 100 voxels.
@@ -162,7 +164,7 @@ TEST(RenderField, FarCamerasLoseNothing) {
 
 TEST(RenderField, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
-  const RenderOptions o = optionsFor({}, {130, 70});
+  const RenderOptions o = sumOptions({}, {130, 70});
   const auto draw = [&] { return renderField(field, o).rgba; };
   const auto one = onThreads(1, draw);
   EXPECT_EQ(one, onThreads(2, draw));
@@ -170,7 +172,7 @@ TEST(RenderField, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(RenderField, TheEndOfARayCostsLittle) {
-  RenderOptions early = optionsFor(), never = optionsFor();
+  RenderOptions early = sumOptions(), never = sumOptions();
   early.opacityLength = never.opacityLength = 0.5;
   never.minTransmittance = 0.0;
   const Field field = randomField({.count = 100});
@@ -181,18 +183,18 @@ TEST(RenderField, TheEndOfARayCostsLittle) {
 TEST(RenderField, WhatIsNotSeenIsTransparent) {
   const Field field = randomField({});
   const Image behind =
-      renderField(field, optionsFor({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}}));
+      renderField(field, sumOptions({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}}));
   for (const float v : behind.rgba) ASSERT_EQ(v, 0.0f);
-  const Image none = renderField(Field{}, optionsFor());
+  const Image none = renderField(Field{}, sumOptions());
   for (const float v : none.rgba) ASSERT_EQ(v, 0.0f);
 }
 
 TEST(RenderField, APixelAloneIsAPicture) {
-  EXPECT_GE(agreement(randomField({.count = 200}), optionsFor({}, {1, 1})), kAsked);
+  EXPECT_GE(sumAgreement(randomField({.count = 200}), sumOptions({}, {1, 1})), kAskedOfSums);
 }
 
 TEST(RenderField, FullOpacityShowsTheFirstSampleAndNoneShowsNothing) {
-  RenderOptions o = optionsFor();
+  RenderOptions o = sumOptions();
   o.transfer.opacity = {{0.0, 1.0}};
   const Image opaque = renderField(randomField({}), o);
   for (std::size_t i = 3; i < opaque.rgba.size(); i += 4)
@@ -204,7 +206,7 @@ TEST(RenderField, FullOpacityShowsTheFirstSampleAndNoneShowsNothing) {
 TEST(RenderField, ATransferFunctionBesideTheDataIsTheColorAtItsEnd) {
   Field field = randomField({.count = 50});
   for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
-  RenderOptions o = optionsFor();
+  RenderOptions o = sumOptions();
   o.transfer.colors.points = {{100.0, {0.5, 0.25, 0.0}}, {200.0, {0.0, 0.0, 1.0}}};
   o.transfer.opacity = {{100.0, 1.0}, {200.0, 0.0}};
   const Image image = renderField(field, o);
@@ -219,7 +221,7 @@ TEST(RenderField, ATransferFunctionBesideTheDataIsTheColorAtItsEnd) {
 
 TEST(RenderField, OptionsThatMakeNoSenseAreRefused) {
   const auto refused = [](auto&& spoil) {
-    RenderOptions o = optionsFor();
+    RenderOptions o = sumOptions();
     spoil(o);
     EXPECT_THROW((void)renderField(Field{}, o), UsageError);
     EXPECT_THROW((void)renderVolume(SparseVolume{}, o), UsageError);
@@ -239,7 +241,7 @@ TEST(RenderField, OptionsThatMakeNoSenseAreRefused) {
 TEST(RenderField, StopsWhereAsked) {
   CancelToken cancel;
   cancel.cancel();
-  RenderOptions o = optionsFor();
+  RenderOptions o = sumOptions();
   o.cancel = &cancel;
   EXPECT_THROW((void)renderField(randomField({}), o), Cancelled);
 }
@@ -250,7 +252,7 @@ TEST(RenderField, SupportsOfAnySizeAreRefused) {
   for (const float logScale : {18.0f, 32.0f}) {
     Field field = randomField({.count = 3});
     for (auto& scale : field.chunks[0].ellipsoids.logScale) scale[1] = logScale;
-    RenderOptions o = optionsFor({}, {4, 4});
+    RenderOptions o = sumOptions({}, {4, 4});
     o.between = Between::kSum;
     EXPECT_THROW((void)renderField(field, o), UsageError) << logScale;
     o.between = Between::kVoxels;
@@ -365,7 +367,7 @@ TEST(VisibleEllipsoids, LeaveOutWhatLiesBehindTheEye) {
 // Modes and clip boxes.
 
 RenderOptions optionsOf(RenderMode mode, Projection projection = Projection::kPerspective) {
-  RenderOptions o = optionsFor({.projection = projection}, {30, 22});
+  RenderOptions o = sumOptions({.projection = projection}, {30, 22});
   o.mode = mode;
   return o;
 }

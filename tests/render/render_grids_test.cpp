@@ -47,14 +47,14 @@ void addPart(const std::vector<ReferenceGrid>& grids, const std::vector<double>&
 
 void addSegment(const std::vector<ReferenceGrid>& grids, const std::vector<double>& from,
                 const std::vector<double>& to, double length, Light& light) {
-  constexpr int kParts = 16;
+  constexpr int kRayParts = 16;
   std::vector<double> a(from.size()), b(from.size());
-  for (int p = 0; p < kParts; ++p) {
+  for (int p = 0; p < kRayParts; ++p) {
     for (std::size_t g = 0; g < from.size(); ++g) {
-      a[g] = from[g] + (to[g] - from[g]) * p / kParts;
-      b[g] = from[g] + (to[g] - from[g]) * (p + 1) / kParts;
+      a[g] = from[g] + (to[g] - from[g]) * p / kRayParts;
+      b[g] = from[g] + (to[g] - from[g]) * (p + 1) / kRayParts;
     }
-    addPart(grids, a, b, length / kParts, light);
+    addPart(grids, a, b, length / kRayParts, light);
   }
 }
 

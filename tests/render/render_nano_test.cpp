@@ -17,9 +17,9 @@
 namespace esvr::test {
 namespace {
 
-constexpr Box kBox{{-20, -20, -20}, {59, 59, 59}};
+constexpr Box kNanoBox{{-20, -20, -20}, {59, 59, 59}};
 
-VolumeGrid blobs(Coord origin = {-20, -20, -20}) {
+VolumeGrid nanoBlobs(Coord origin = {-20, -20, -20}) {
   VolumeGrid grid;
   grid.descriptor.transform = uniformTransform(1.0);
   const Field field = randomField({.count = 30, .extent = 70.0, .smallest = 1.0, .origin = origin});
@@ -27,10 +27,10 @@ VolumeGrid blobs(Coord origin = {-20, -20, -20}) {
   return grid;
 }
 
-RenderOptions optionsFor(const CameraWish& wish = {}) {
+RenderOptions nanoOptions(const CameraWish& wish = {}) {
   RenderOptions o;
   o.resolution = {70, 50};
-  o.camera = fitCamera(kBox, wish, o.resolution);
+  o.camera = fitCamera(kNanoBox, wish, o.resolution);
   o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
   o.opacityLength = 8.0;
   o.lod = LevelOfDetail::kOff;
@@ -52,20 +52,20 @@ TEST(RenderNano, DrawsTheVolumesPicture) {
   const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
   for (const CameraWish& wish :
        {CameraWish{}, CameraWish{.projection = Projection::kOrthographic}, inside})
-    expectTheVolumesPicture(blobs(), NanoValues::kFloat, optionsFor(wish), 1e-3);
+    expectTheVolumesPicture(nanoBlobs(), NanoValues::kFloat, nanoOptions(wish), 1e-3);
 }
 
 TEST(RenderNano, AgreesForOtherSteps) {
   for (const double step : {0.3, 2.7}) {
-    RenderOptions o = optionsFor();
+    RenderOptions o = nanoOptions();
     o.step = step;
-    expectTheVolumesPicture(blobs(), NanoValues::kFloat, o, 1e-3);
+    expectTheVolumesPicture(nanoBlobs(), NanoValues::kFloat, o, 1e-3);
   }
 }
 
 TEST(RenderNano, StepsOverAllOfAFarEmptySpace) {
-  VolumeGrid grid = blobs();
-  const VolumeGrid other = blobs({5000, -20, -20});
+  VolumeGrid grid = nanoBlobs();
+  const VolumeGrid other = nanoBlobs({5000, -20, -20});
   std::vector<BrickInput> bricks;
   for (const SparseVolume* from : {&std::as_const(grid.volume), &other.volume})
     for (std::size_t b = 0; b < from->brickCount(); ++b) {
@@ -75,15 +75,15 @@ TEST(RenderNano, StepsOverAllOfAFarEmptySpace) {
     }
   grid.volume = makeVolume(std::move(bricks), 0.0f);
   const RenderOptions o =
-      optionsFor({.eye = Vec3{-200, 20, 20}, .center = Vec3{0, 20, 20}, .fov = 20.0});
+      nanoOptions({.eye = Vec3{-200, 20, 20}, .center = Vec3{0, 20, 20}, .fov = 20.0});
   expectTheVolumesPicture(grid, NanoValues::kFloat, o, 1e-3);
 }
 
 /// The background is a quantised value too, so it is not exactly empty; the opacity begins at it.
 TEST(RenderNano, QuantisedValuesAreCloseBy) {
-  VolumeGrid grid = blobs();
+  VolumeGrid grid = nanoBlobs();
   for (float& v : grid.volume.values) v = std::abs(v);
-  RenderOptions o = optionsFor();
+  RenderOptions o = nanoOptions();
   o.transfer = rescaled(o.transfer, {0.0f, 1.0f});
   expectTheVolumesPicture(grid, NanoValues::kFp16, o, 2e-3);
   expectTheVolumesPicture(grid, NanoValues::kFp8, o, 0.02);
@@ -95,7 +95,7 @@ TEST(RenderNano, AnEmptyGridIsTransparent) {
   VolumeGrid grid;
   grid.descriptor.transform = uniformTransform(1.0);
   const NanoVolume nano = makeNanoVolume(grid, NanoValues::kFloat);
-  for (const float v : renderNano(nano, optionsFor()).rgba) ASSERT_EQ(v, 0.0f);
+  for (const float v : renderNano(nano, nanoOptions()).rgba) ASSERT_EQ(v, 0.0f);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@
 namespace esvr::test {
 namespace {
 
-constexpr double kAsked = 70.0;
+constexpr double kAskedOfBricks = 70.0;
 
 /// A few bricks far apart, some with neighbours, with random values.
 SparseVolume scattered(Coord shift = {}) {
@@ -26,7 +26,7 @@ SparseVolume scattered(Coord shift = {}) {
   return randomBricks(corners, 3);
 }
 
-double agreement(const SparseVolume& volume, const RenderOptions& o) {
+double brickAgreement(const SparseVolume& volume, const RenderOptions& o) {
   const double farthest = length(difference(o.camera.eye, o.camera.center)) + 100.0;
   const SampledScene scene{[&](const Vec3& place) { return trilinear(volume, place); },
                            volume.background, farthest};
@@ -35,9 +35,9 @@ double agreement(const SparseVolume& volume, const RenderOptions& o) {
 
 TEST(RenderVolume, AgreesWithADenseWalk) {
   const auto volume = scattered();
-  EXPECT_GE(agreement(volume, optionsFor(volume)), kAsked);
-  EXPECT_GE(agreement(volume, optionsFor(volume, {.projection = Projection::kOrthographic})),
-            kAsked);
+  EXPECT_GE(brickAgreement(volume, optionsFor(volume)), kAskedOfBricks);
+  EXPECT_GE(brickAgreement(volume, optionsFor(volume, {.projection = Projection::kOrthographic})),
+            kAskedOfBricks);
 }
 
 TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
@@ -49,7 +49,7 @@ TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
     o.camera.center = {8.0, 20.0, 0.0};
     o.camera.eye = sum(o.camera.center, from);
     o.camera.up = from[1] == 0.0 ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
-    EXPECT_GE(agreement(volume, o), kAsked);
+    EXPECT_GE(brickAgreement(volume, o), kAskedOfBricks);
   }
 }
 
@@ -60,7 +60,7 @@ TEST(RenderVolume, VoxelsThatAreNoCubesAgreeWithADenseWalk) {
                                   VoxelShape{{{{1, 0, 0}, {0.5, 1, 0}, {0.2, -0.3, 1.5}}}}})
     for (const auto projection : {Projection::kPerspective, Projection::kOrthographic}) {
       RenderOptions o = optionsFor(volume, {.projection = projection, .voxel = voxel});
-      EXPECT_GE(agreement(volume, o), kAsked);
+      EXPECT_GE(brickAgreement(volume, o), kAskedOfBricks);
     }
 }
 
@@ -83,7 +83,7 @@ TEST(RenderVolume, CamerasThatAreFarAwaySeeTheVolume) {
 TEST(RenderVolume, AgreesFromInside) {
   const auto volume = scattered();
   const CameraWish inside{.eye = Vec3{9, 10, 11}, .center = Vec3{40, 12, 20}, .fov = 90.0};
-  EXPECT_GE(agreement(volume, optionsFor(volume, inside)), kAsked);
+  EXPECT_GE(brickAgreement(volume, optionsFor(volume, inside)), kAskedOfBricks);
 }
 
 TEST(RenderVolume, EmptySpaceIsTransparentWhateverItsOpacity) {
@@ -92,7 +92,7 @@ TEST(RenderVolume, EmptySpaceIsTransparentWhateverItsOpacity) {
   RenderOptions o = optionsFor(volume);
   o.transfer.opacity = builtInOpacity("inverse");
   o.opacityLength = o.step;  // 1 - (1 - opacity)^0.1 is too steep at opacity 1 for a table
-  EXPECT_GE(agreement(volume, o), kAsked);
+  EXPECT_GE(brickAgreement(volume, o), kAskedOfBricks);
   EXPECT_EQ(renderVolume(volume, o).rgba[3], 0.0f) << "a corner that no ray to the volume meets";
 }
 

@@ -251,7 +251,7 @@ RenderOptions tilted(double voxels, const TransferFunction& transfer, const Vec3
   return o;
 }
 
-constexpr double kFine = 0.02;  // a step at which pictures no longer depend on the step
+constexpr double kFine = 0.04;  // a step at which pictures no longer depend on the step
 
 /// The largest difference of a picture from that with short steps.
 double fromFine(const SparseVolume& volume, RenderOptions o) {
@@ -316,7 +316,7 @@ TEST(Classification, TheSilhouetteOfALevelSetIsCloseToThatOfManyRays) {
   fine.step = kFine;
   const Image oneRay = renderVolume(boxLevelSet(), fine);
   o.resolution = {256, 256};
-  o.step = kFine;
+  o.step = 0.1;  // no ray of many needs to be as exact as the one
   const Image many = meansOfSquares(renderVolume(boxLevelSet(), o), 4);
   EXPECT_GE(imagePsnr(drawn, many), imagePsnr(oneRay, many) - 0.3);
 }

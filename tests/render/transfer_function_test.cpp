@@ -18,7 +18,7 @@
 namespace esvr::test {
 namespace {
 
-constexpr double kExact = 1e-12, kFourDigits = 1e-3, kTable = 2.5 / 255.0;
+constexpr double kExactColor = 1e-12, kFourDigits = 1e-3, kTable = 2.5 / 255.0;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 void expectColor(const Rgb& actual, const Rgb& expected, double tolerance) {
@@ -99,19 +99,19 @@ TEST(OpacityCurve, BuiltInShapes) {
   const double tent[] = {0.0, 0.5, 0.98, 0.98, 0.5, 0.0};
   const double step[] = {0.0, 0.0, 0.0, 1.0, 1.0, 1.0};
   for (int i = 0; i < 6; ++i) {
-    EXPECT_NEAR(opacityAt(builtInOpacity("linear"), at[i]), linear[i], kExact);
-    EXPECT_NEAR(opacityAt(builtInOpacity("inverse"), at[i]), 1.0 - linear[i], kExact);
-    EXPECT_NEAR(opacityAt(builtInOpacity("tent"), at[i]), tent[i], kExact);
-    EXPECT_NEAR(opacityAt(builtInOpacity("step"), at[i]), step[i], kExact);
+    EXPECT_NEAR(opacityAt(builtInOpacity("linear"), at[i]), linear[i], kExactColor);
+    EXPECT_NEAR(opacityAt(builtInOpacity("inverse"), at[i]), 1.0 - linear[i], kExactColor);
+    EXPECT_NEAR(opacityAt(builtInOpacity("tent"), at[i]), tent[i], kExactColor);
+    EXPECT_NEAR(opacityAt(builtInOpacity("step"), at[i]), step[i], kExactColor);
   }
 }
 
 TEST(OpacityCurve, TheMidpointHasHalfOfTheChange) {
   for (const double sharpness : {0.0, 0.3, 0.7}) {
     const OpacityCurve curve{{0.0, 0.2, 0.8, sharpness}, {1.0, 0.6}};
-    EXPECT_NEAR(opacityAt(curve, 0.8), 0.4, kExact);
-    EXPECT_NEAR(opacityAt(curve, 0.0), 0.2, kExact);
-    EXPECT_NEAR(opacityAt(curve, 1.0), 0.6, kExact);
+    EXPECT_NEAR(opacityAt(curve, 0.8), 0.4, kExactColor);
+    EXPECT_NEAR(opacityAt(curve, 0.0), 0.2, kExactColor);
+    EXPECT_NEAR(opacityAt(curve, 1.0), 0.6, kExactColor);
   }
 }
 
@@ -120,7 +120,7 @@ TEST(OpacityCurve, SharpnessDrawsTheCurveToItsEnds) {
   // tangents 0.5 is then 3 s^2 - 2 s^3 + 0.5 (2 s^3 - 3 s^2 + s).
   const OpacityCurve curve{{0.0, 0.0, 0.5, 0.5}, {1.0, 1.0}};
   const double s = 1.0 / 128, s2 = s * s, s3 = s2 * s;
-  EXPECT_NEAR(opacityAt(curve, 0.25), 3 * s2 - 2 * s3 + 0.5 * (2 * s3 - 3 * s2 + s), kExact);
+  EXPECT_NEAR(opacityAt(curve, 0.25), 3 * s2 - 2 * s3 + 0.5 * (2 * s3 - 3 * s2 + s), kExactColor);
 }
 
 TEST(OpacityCurve, MidpointsAtTheEndsOfASegmentAreNoDivisionByZero) {
@@ -133,9 +133,9 @@ TEST(OpacityCurve, MidpointsAtTheEndsOfASegmentAreNoDivisionByZero) {
 
 TEST(TransferFunction, RescalingMovesColorsAndOpacitiesIntoTheRange) {
   const auto f = rescaled({builtInColorMap("grayscale"), builtInOpacity("tent")}, {-2.0f, 6.0f});
-  expectColor(colorAt(f.colors, 0.0), {0.25, 0.25, 0.25}, kExact);
-  EXPECT_NEAR(opacityAt(f.opacity, 2.0), 1.0, kExact);
-  EXPECT_NEAR(opacityAt(f.opacity, 6.0), 0.0, kExact);
+  expectColor(colorAt(f.colors, 0.0), {0.25, 0.25, 0.25}, kExactColor);
+  EXPECT_NEAR(opacityAt(f.opacity, 2.0), 1.0, kExactColor);
+  EXPECT_NEAR(opacityAt(f.opacity, 6.0), 0.0, kExactColor);
 }
 
 TEST(TransferFunction, ARangeWithoutExtentShowsTheUpperEnd) {
@@ -246,19 +246,20 @@ TEST(ColorSpaces, BothEndsAreTheColorsGiven) {
 }
 
 TEST(ColorSpaces, RgbMixesChannels) {
-  expectColor(mixed(ColorSpace::kRgb, {0, 0.2, 1}, {1, 0.4, 0}, 0.25), {0.25, 0.25, 0.75}, kExact);
+  expectColor(mixed(ColorSpace::kRgb, {0, 0.2, 1}, {1, 0.4, 0}, 0.25), {0.25, 0.25, 0.75},
+              kExactColor);
 }
 
 TEST(ColorSpaces, HsvPassesThroughTheHuesBetween) {
   // Red has hue 0 and green hue 1/3; yellow is half-way. From red to blue (2/3), the path passes
   // green.
-  expectColor(mixed(ColorSpace::kHsv, {1, 0, 0}, {0, 1, 0}, 0.5), {1, 1, 0}, kExact);
-  expectColor(mixed(ColorSpace::kHsv, {1, 0, 0}, {0, 0, 1}, 0.5), {0, 1, 0}, kExact);
+  expectColor(mixed(ColorSpace::kHsv, {1, 0, 0}, {0, 1, 0}, 0.5), {1, 1, 0}, kExactColor);
+  expectColor(mixed(ColorSpace::kHsv, {1, 0, 0}, {0, 0, 1}, 0.5), {0, 1, 0}, kExactColor);
 }
 
 TEST(ColorSpaces, WrappedHsvTakesTheShorterWay) {
-  expectColor(mixed(ColorSpace::kHsvWrap, {1, 0, 0}, {0, 0, 1}, 0.5), {1, 0, 1}, kExact);
-  expectColor(mixed(ColorSpace::kHsvWrap, {0, 0, 1}, {1, 0, 0}, 0.5), {1, 0, 1}, kExact);
+  expectColor(mixed(ColorSpace::kHsvWrap, {1, 0, 0}, {0, 0, 1}, 0.5), {1, 0, 1}, kExactColor);
+  expectColor(mixed(ColorSpace::kHsvWrap, {0, 0, 1}, {1, 0, 0}, 0.5), {1, 0, 1}, kExactColor);
 }
 
 TEST(ColorSpaces, LabMixesBlackAndWhiteToTheGreyOfHalfTheLightness) {

@@ -451,16 +451,16 @@ TEST_F(Damage, AnyByteMayBeWrong) {
   EXPECT_GT(refused, 500u);
 }
 
-TEST_F(Damage, EveryBitOfALeafMayBeWrong) {
+TEST_F(Damage, AnyByteOfALeafMayBeWrong) {
   for (const auto compression : kEveryCodec) {
     test::saveCompressed(path(), {test::smallGrid()}, compression);
     const Bytes whole = test::bytesOf(path());
     // The last leaf's mask, packing, chunk size, chunk header and the first of its values.
     const std::size_t leafBytes = std::min<std::size_t>(whole.size(), compression ? 110 : 2200);
     for (std::size_t i = whole.size() - leafBytes; i < whole.size() - leafBytes + 110; ++i)
-      for (int bit = 0; bit < 8; ++bit) {
+      for (const int bits : {0x01, 0x80}) {
         Bytes damaged = whole;
-        damaged[i] ^= std::byte(1 << bit);
+        damaged[i] ^= std::byte(bits);
         (void)readable(damaged);
       }
   }

@@ -30,14 +30,14 @@ vdb::NanoHandle vectors(const openvdb::Vec3SGrid& grid) {
 
 }  // namespace
 
-openvdb::GridBase::Ptr emptyGrid(const std::string& treeType, const std::string& name) {
+OpenVdbGrid emptyGrid(const std::string& treeType, const std::string& name) {
   openvdb::initialize();
   auto grid = openvdb::GridBase::createGrid(treeType);
   grid->setName(name);
   return grid;
 }
 
-void saveNano(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
+void saveNano(const std::filesystem::path& path, const std::vector<OpenVdbGrid>& grids,
               NanoCodec codec) {
   std::vector<vdb::NanoHandle> handles;
   for (const auto& grid : grids) {

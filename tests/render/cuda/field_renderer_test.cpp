@@ -19,7 +19,7 @@ namespace esvr::test {
 namespace {
 
 constexpr double kAsked = 1.0 / 255.0;
-constexpr Box kBox{{0, 0, 0}, {39, 39, 39}};
+constexpr Box kFieldBox{{0, 0, 0}, {39, 39, 39}};
 
 CameraWish orthographic() { return {.projection = Projection::kOrthographic}; }
 CameraWish inside() {
@@ -58,7 +58,7 @@ class FieldOnGpu : public OnGpu, public testing::WithParamInterface<Between> {
                                          Resolution resolution = {130, 77}) const {
     RenderOptions o;
     o.resolution = resolution;
-    o.camera = fitCamera(kBox, wish, resolution);
+    o.camera = fitCamera(kFieldBox, wish, resolution);
     o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
     o.opacityLength = 8.0;
     o.between = GetParam();

@@ -13,7 +13,7 @@
 namespace esvr::test {
 namespace {
 
-VolumeGrid blobs() {
+VolumeGrid nanoBlobs() {
   VolumeGrid grid;
   grid.descriptor.transform = uniformTransform(1.0);
   grid.volume = revoxelise(randomField({.count = 60, .extent = 40.0}), {.threshold = 0.05f});
@@ -21,7 +21,7 @@ VolumeGrid blobs() {
   return grid;
 }
 
-RenderOptions options(double step = 1.0) {
+RenderOptions nanoOptions(double step = 1.0) {
   RenderOptions o;
   o.resolution = {131, 78};
   o.camera = fitCamera({{0, 0, 0}, {39, 39, 39}}, {}, o.resolution);
@@ -33,7 +33,7 @@ RenderOptions options(double step = 1.0) {
   return o;
 }
 
-void expectClose(const Image& a, const Image& b) {
+void expectNanoClose(const Image& a, const Image& b) {
   ASSERT_EQ(a.rgba.size(), b.rgba.size());
   for (std::size_t i = 0; i < a.rgba.size(); ++i) ASSERT_NEAR(a.rgba[i], b.rgba[i], 1.0 / 255.0);
 }
@@ -41,19 +41,19 @@ void expectClose(const Image& a, const Image& b) {
 class NanoOnGpu : public OnGpu, public testing::WithParamInterface<NanoValues> {};
 
 TEST_P(NanoOnGpu, DrawsTheCpusPicture) {
-  const NanoVolume nano = makeNanoVolume(blobs(), GetParam());
+  const NanoVolume nano = makeNanoVolume(nanoBlobs(), GetParam());
   for (const double step : {0.5, 1.0, 3.0})
-    expectClose(makeNanoRenderer(nano, device_)->draw(options(step)),
-                renderNano(nano, options(step)));
+    expectNanoClose(makeNanoRenderer(nano, device_)->draw(nanoOptions(step)),
+                    renderNano(nano, nanoOptions(step)));
 }
 
 TEST_P(NanoOnGpu, DrawsInBandsWhereMemoryIsShort) {
-  const NanoVolume nano = makeNanoVolume(blobs(), GetParam());
+  const NanoVolume nano = makeNanoVolume(nanoBlobs(), GetParam());
   const std::uint64_t bound = nano.bytes + 240'000;  // the tables and a part of the pixels
   const auto renderer = makeNanoRenderer(nano, device_, {.maxBytes = bound});
-  expectClose(renderer->draw(options()), renderNano(nano, options()));
+  expectNanoClose(renderer->draw(nanoOptions()), renderNano(nano, nanoOptions()));
   EXPECT_LE(renderer->stats().deviceBytes, bound);
-  EXPECT_THROW((void)makeNanoRenderer(nano, device_, {.maxBytes = 1000})->draw(options()),
+  EXPECT_THROW((void)makeNanoRenderer(nano, device_, {.maxBytes = 1000})->draw(nanoOptions()),
                DeviceError);
 }
 
