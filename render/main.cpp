@@ -440,6 +440,17 @@ void reportTransform(const Options& options, const std::vector<Scene>& scenes) {
           "as cubes");
 }
 
+/// Warns that --between sum has no effect on a grid. \return whether it has none
+bool reportBetween(const Options& options, const std::vector<Scene>& scenes) {
+  if (options.between != Between::kSum || hasSum(scenes.front())) return false;
+  cli::Log(kProgram, options.verbosity)
+      .warning(
+          options.input.string() + ", " + scenes.front().grid +
+          ": it is no sum of ellipsoids alone, so that its voxels are drawn; --between sum has no "
+          "effect");
+  return true;
+}
+
 void saveTransfer(const Options& options, const TransferFunction& transfer) {
   if (options.saveTransfer.empty()) return;
   const std::string text = paraViewPreset(transfer, options.saveTransfer.stem().string());
@@ -467,6 +478,7 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
   Frames frames(options, all, nullptr, cancel);
+  bool isReported = false;  // one warning for all frames
   for (const cli::FrameNumber frame : *options.frames) {
     const PictureFiles files = filesOfFrame(options, frame);
     auto scenes = input.scenes(frame);
@@ -474,6 +486,7 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
       frames.drawNothing(r, files);
       continue;
     }
+    isReported = isReported || reportBetween(options, *scenes);
     Drawing drawing(std::move(*scenes), settings);
     frames.draw(drawing, r, files);
   }
@@ -485,11 +498,13 @@ void run(const Options& options) {
   const cli::Interrupts interrupts;
   checkFiles(options);
   checkPictureSize(options);
-  const DrawSettings settings{selectDevice(options.device), options.limits, options.values,
-                              options.shading.has_value(), options.memory};
+  const DrawSettings settings{
+      selectDevice(options.device), options.limits, options.values,
+      options.shading.has_value(),  options.memory, options.between == Between::kSum};
   if (options.frames) return drawSequence(options, settings, interrupts.token());
   auto scenes = readScenes(sceneFile(options, options.input));
   reportTransform(options, scenes);
+  (void)reportBetween(options, scenes);
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);
   const auto reference = referenceOf(options, drawing.scenes.front().grid, settings);

@@ -297,50 +297,52 @@ void enclose(const std::vector<Scene>& others, std::vector<Scene>& scenes) {
 
 // Drawing.
 
+bool hasSum(const Scene& scene) {
+  return std::holds_alternative<Field>(scene.content) && scene.encoded &&
+         followsFromEllipsoids(*scene.encoded);
+}
+
 SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSettings& s) {
   if (scenes.size() == 1) {
     drawAlone(scenes.front(), s);
     return;
   }
   std::vector<DrawnGrid> grids;
-  for (const Scene& scene : scenes) grids.push_back(drawnGrid(scene, s.memory));
+  for (const Scene& scene : scenes) grids.push_back(drawnGrid(scene, s));
   renderer_ = makeGridsRenderer(grids, s.device, s.limits);
 }
 
-DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const cli::HostMemory& memory) {
+DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const DrawSettings& s) {
   if (const auto* const grid = std::get_if<VolumeGrid>(&scene.content)) return &grid->volume;
   const StoredGrid& stored = *scene.encoded;
-  if (followsFromEllipsoids(stored)) {
-    DrawnField drawn{&std::get<Field>(scene.content), voxelRule(stored)};
-    drawn.voxels.memory = memory.voxels;
+  const DecodeOptions decoding{.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels};
+  if (hasSum(scene)) {
+    const Field& field = std::get<Field>(scene.content);
+    if (!s.sums && liesFarApart(field, scene.box))
+      requireWithinMemory(estimateDecode(stored, decoding).bytes(decoding.memory),
+                          decoding.maxBytes, "the voxels of " + scene.grid);
+    DrawnField drawn{&field, voxelRule(stored)};
+    drawn.voxels.memory = decoding.memory;
     return drawn;
   }
-  decoded_.push_back(decodeGrid(stored, {.maxBytes = memory.maxBytes, .memory = memory.voxels}));
+  decoded_.push_back(decodeGrid(stored, decoding));
   return &decoded_.back();
 }
 
 void SceneRenderer::drawAlone(const Scene& scene, const DrawSettings& s) {
   const bool isNano = !s.shaded && (s.device.kind == DeviceKind::kCuda || s.values);
-  const auto* voxels = std::get_if<VolumeGrid>(&scene.content);
-  const auto* const field = std::get_if<Field>(&scene.content);
-  // The renderer of ellipsoids on a CUDA device cannot draw these, but that of NanoVDB grids can.
-  if (field && s.device.kind == DeviceKind::kCuda && liesFarApart(*field, scene.box)) {
-    const StoredGrid& stored = *scene.encoded;
-    farApart_ = VolumeGrid{
-        stored.descriptor,
-        decodeGrid(stored, {.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels}), 0};
-    voxels = &*farApart_;
-  }
+  const auto* const voxels = std::get_if<VolumeGrid>(&scene.content);
   if (voxels && isNano) return sampleNano(*voxels, s);
-  if (farApart_) {
-    renderer_ = makeVolumeRenderer(farApart_->volume, s.device, s.limits);
+  const DrawnGrid grid = drawnGrid(scene, s);
+  if (const auto* const drawn = std::get_if<DrawnField>(&grid)) {
+    renderer_ = makeFieldRenderer(*drawn->field, s.device, s.limits, drawn->voxels);
     return;
   }
-  const DrawnGrid grid = drawnGrid(scene, s.memory);
-  if (const auto* const drawn = std::get_if<DrawnField>(&grid))
-    renderer_ = makeFieldRenderer(*drawn->field, s.device, s.limits, drawn->voxels);
-  else
-    renderer_ = makeVolumeRenderer(*std::get<const SparseVolume*>(grid), s.device, s.limits);
+  // The bricks of a CUDA device have a table of the space between them, which NanoVDB grids have not.
+  const SparseVolume& volume = *std::get<const SparseVolume*>(grid);
+  if (isNano && scene.encoded && liesFarApart(std::get<Field>(scene.content), scene.box))
+    return sampleNano({scene.encoded->descriptor, volume, 0}, s);
+  renderer_ = makeVolumeRenderer(volume, s.device, s.limits);
 }
 
 void SceneRenderer::sampleNano(const VolumeGrid& grid, const DrawSettings& s) {

@@ -82,27 +82,32 @@ struct DrawSettings {
   std::optional<NanoValues> values;  ///< draw voxels as a NanoVDB grid of this value type
   bool shaded = false;               ///< whether pictures are shaded
   cli::HostMemory memory;            ///< memory that input may take
+  bool sums = false;                 ///< whether all pictures are drawn with Between::kSum
 };
+
+/// Whether a grid has a sum of ellipsoids to draw. The others are drawn from their voxels, whatever
+/// RenderOptions::between says.
+[[nodiscard]] bool hasSum(const Scene& scene);
 
 /// Draws a grid, or several grids in one picture. They must outlive it.
 class SceneRenderer {
  public:
   /// Voxels are drawn as a NanoVDB grid on a CUDA device, or if `values` asks for one, but not if
   /// pictures are shaded or have several grids. The voxels of a field are decoded when a ray needs
-  /// them. If they do not follow from its ellipsoids alone, all are decoded at once.
+  /// them. If they do not follow from its ellipsoids alone, or lie far apart, all are decoded at once.
   /// \throws DeviceError  the device fails, or its memory is exhausted
+  /// \throws MemoryExceeded  voxels that are decoded at once need more than DrawSettings::memory
   SceneRenderer(const std::vector<Scene>& scenes, const DrawSettings& settings);
 
   Renderer* operator->() { return renderer_.get(); }
   Renderer& operator*() { return *renderer_; }
 
  private:
-  [[nodiscard]] DrawnGrid drawnGrid(const Scene& scene, const cli::HostMemory& memory);
+  [[nodiscard]] DrawnGrid drawnGrid(const Scene& scene, const DrawSettings& settings);
   void drawAlone(const Scene& scene, const DrawSettings& settings);
   void sampleNano(const VolumeGrid& grid, const DrawSettings& settings);
 
   std::deque<SparseVolume> decoded_;
-  std::optional<VolumeGrid> farApart_;
   NanoVolume nano_;
   std::unique_ptr<Renderer> renderer_;
 };

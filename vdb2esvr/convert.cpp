@@ -87,7 +87,23 @@ const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted) {
   return nullptr;
 }
 
+SourceKey sourceKeyOf(const Options& options, const FittedGrid& fitted, const VolumeGrid& source) {
+  return {keyOf({source.descriptor, source.volume}), fitted.peak, fitted.range,
+          ownGoalOf(options, fitted)};
+}
+
 namespace {
+
+/// The same grid of the previous frame, if it was made from the same source.
+const StoredGrid* asBefore(const Options& options, const FittedGrid& fitted,
+                           const VolumeGrid& source, const SourceKey& key) {
+  const StoredGrid* const before = previousOf(options, fitted);
+  const auto keyBefore = options.previousSources->find(fitted.uniqueName);
+  const bool isSame = before != nullptr && keyBefore != options.previousSources->end() &&
+                      keyBefore->second == key &&
+                      before->descriptor.valueType == source.descriptor.valueType;
+  return isSame ? before : nullptr;
+}
 
 void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
   const ConvertOptions& convert = options.convert;
@@ -191,7 +207,19 @@ ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
   grid.seconds.read = watch.lap();
 
   grid.device = deviceName(fit.device);
-  convert(options, source, {bytes, expected ? expected : previousOf(options, fitted)}, grid);
+  const StoredGrid* before = nullptr;
+  if (options.previousSources != nullptr) {
+    grid.source = sourceKeyOf(options, fitted, source);
+    before = asBefore(options, fitted, source, *grid.source);
+  }
+  if (before != nullptr) {
+    grid.asBefore = true;
+    grid.conversion.grid = *before;
+    grid.conversion.grid.descriptor = source.descriptor;
+    grid.conversion.grid.reference.reset();  // it may name another grid of this file
+  } else {
+    convert(options, source, {bytes, expected ? expected : previousOf(options, fitted)}, grid);
+  }
   grid.seconds.seed = grid.conversion.fit.secondsSeed;
   grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
   grid.seconds.encode = watch.lap() - grid.seconds.fit();

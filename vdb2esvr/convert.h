@@ -86,6 +86,8 @@ struct ConvertedGrid {
   std::optional<SharedBytes> shared;  ///< nothing if it shares nothing
   std::optional<NamedGrid> twinOf;    ///< id of the grid that this one is a twin of
   std::string sameAs;                 ///< unique name of that grid
+  std::optional<SourceKey> source;    ///< of a grid of a group of frames
+  bool asBefore = false;              ///< it is the grid of the previous frame
   PhaseSeconds seconds;
 
   [[nodiscard]] const StoredGrid& stored() const { return conversion.grid; }
@@ -94,6 +96,10 @@ struct ConvertedGrid {
 /// The same grid of the previous frame, which is the one with its number among those that are stored by
 /// its name; null if there is none.
 [[nodiscard]] const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted);
+
+/// \param source  the grid as it was read
+[[nodiscard]] SourceKey sourceKeyOf(const Options& options, const FittedGrid& fitted,
+                                    const VolumeGrid& source);
 
 /// Reads, converts and measures a grid. A process that only fits does not measure it.
 /// \param bytes  bytes that the grid may add to the file, if a size is wanted

@@ -3,8 +3,10 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "esvr/container.h"
@@ -27,6 +29,11 @@ struct GridGoal {
   std::size_t place = 0;  ///< of the grid in the input (resolveNames)
 };
 
+/// What decides the conversion of a grid besides the options that all grids have in common: its volume,
+/// the peak of its PSNR, its range, and the index of its own goal.
+using SourceKey =
+    std::tuple<InputKey, std::optional<double>, std::optional<double>, std::optional<std::size_t>>;
+
 struct Options {
   std::filesystem::path input, output;
   cli::InputFiles inputs;
@@ -35,6 +42,9 @@ struct Options {
   std::optional<cli::Sequence> sequence;
   /// For a frame of a group: the frame before it as a reader gets it; null for the first one.
   const EsvrFile* previous = nullptr;
+  /// The sources of its grids by FittedGrid::uniqueName. A grid with the same source is that of the
+  /// previous frame, so that a scene that stands still does not change.
+  const std::map<std::string, SourceKey>* previousSources = nullptr;
   WantedGrids grids;
   bool shares = true;               ///< grids of a file share what they have in common
   ConvertOptions convert;           ///< options and goal of every grid; a size replaces the goal

@@ -353,6 +353,7 @@ Json gridJson(const RunRecord& record, std::size_t g) {
   return {{"name", grid.uniqueName},
           {"component_of", grid.id.component ? Json(grid.sourceName) : Json(nullptr)},
           {"same_as", grid.twinOf ? Json(grid.sameAs) : Json(nullptr)},
+          {"as_previous_frame", grid.asBefore},
           {"shared", sharedOf(grid)},
           {"source", sourceOf(grid)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},

@@ -404,8 +404,10 @@ class GroupConversion {
     Options own = conversion_.optionsOf(frame.frame, worker_);
     own.resume = false;  // the group is converted again as a whole
     own.previous = previous_ ? &*previous_ : nullptr;
+    own.previousSources = &sources_;
     conversion_.convert(own, frame, [&](const EsvrFile& file) { return encode(index, file); });
     keepEncoded();
+    sources_ = std::exchange(frame.sources, {});
   }
 
   void hold(std::size_t index) {
@@ -440,9 +442,10 @@ class GroupConversion {
   const ReadLimits limits_;
   bool isWell_ = true;
   std::vector<EncodedFrame> encoded_;
-  std::optional<EsvrFile> previous_;  ///< the last frame of the group as a reader gets it
-  EncodedFrame last_;                 ///< the frame that was encoded last
-  EsvrFile decoded_;                  ///< the same as a reader gets it
+  std::optional<EsvrFile> previous_;          ///< the last frame of the group as a reader gets it
+  std::map<std::string, SourceKey> sources_;  ///< of its grids
+  EncodedFrame last_;                         ///< the frame that was encoded last
+  EsvrFile decoded_;                          ///< the same as a reader gets it
 };
 
 PartialSequence partialOf(const Options& options) {

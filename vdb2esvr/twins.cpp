@@ -1,8 +1,6 @@
 #include "vdb2esvr/twins.h"
 
 #include <algorithm>
-#include <optional>
-#include <tuple>
 #include <utility>
 
 #include "esvr/encode.h"
@@ -32,9 +30,7 @@ class TwinSearch {
   void read(std::size_t index, const FittedGrid& fitted) {
     cli::Stopwatch watch;
     VolumeGrid grid = sayingTheWayOut(fitted, [&] { return readSource(options_, fitted); });
-    const Key key{keyOf({grid.descriptor, grid.volume}), fitted.peak, fitted.range,
-                  ownGoalOf(options_, fitted)};
-    const auto [first, isNew] = firstBy_.emplace(key, index);
+    const auto [first, isNew] = firstBy_.emplace(sourceKeyOf(options_, fitted, grid), index);
     if (isNew) return;
     twins_[index] = {first->second, std::move(grid.descriptor), grid.nonFiniteReplaced,
                      grid.inactive, watch.lap()};
@@ -43,12 +39,8 @@ class TwinSearch {
   [[nodiscard]] Twins take() { return std::move(twins_); }
 
  private:
-  /// Volume, peak, range, and index of the goal.
-  using Key = std::tuple<InputKey, std::optional<double>, std::optional<double>,
-                         std::optional<std::size_t>>;
-
   const Options& options_;
-  std::map<Key, std::size_t> firstBy_;
+  std::map<SourceKey, std::size_t> firstBy_;
   Twins twins_;
 };
 

@@ -134,8 +134,19 @@ ESVR_HD inline FloatPlace gradientIn(const float* values, const FloatPlace& p, c
   });
 }
 
+/// The largest integer that is not above a coordinate. Not every x86-64 processor has an instruction for
+/// std::floor().
+ESVR_HD inline int wholeBelow(float at) {
+#ifdef __CUDA_ARCH__
+  return int(floorf(at));
+#else
+  const int whole = int(at);
+  return whole - int(float(whole) > at);
+#endif
+}
+
 ESVR_HD inline Coord cellOf(const FloatPlace& p) {
-  return {int(std::floor(p.x)), int(std::floor(p.y)), int(std::floor(p.z))};
+  return {wholeBelow(p.x), wholeBelow(p.y), wholeBelow(p.z)};
 }
 
 ESVR_HD inline bool inside(const BrickTableView& a, const Coord& v) {
@@ -232,17 +243,19 @@ struct LitSamples {
 
 namespace brick_march {
 
-/// Adds a sample, which may be empty space, or begins to divide the segment before it.
+/// Adds a sample, which may be empty space, or begins to divide the segment before it. It is inlined
+/// because the rule's mode is known where it is called.
 /// \return the part of the next sample to add
 template <class Adding>
-ESVR_HD inline int addSample(const SampleRule& rule, const BrickSample& sample, int part,
-                             RayProgress& at, const Adding& adding) {
+[[gnu::always_inline]] ESVR_HD inline int addSample(const SampleRule& rule,
+                                                    const BrickSample& sample, int part,
+                                                    RayProgress& at, const Adding& adding) {
   const SampleNumber& number = sample.number;
   if (rule.bends(at.ray, at.parts, number, sample.value)) return at.parts.divide(part);
   if (sample.value != rule.background) {
     const float before = rule.valueBefore(at.ray, number);
     adding.add(rule, sample, at);
-    at.parts.change = (sample.value - before) * float(kSegmentParts / at.parts.apart());
+    at.parts.change = (sample.value - before) * (at.parts.divided ? float(kSegmentParts) : 1.0f);
   } else if (at.ray.last != RayState::kNone) {
     adding.addEmpty(rule, number.length, at);
   }

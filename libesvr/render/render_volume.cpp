@@ -23,10 +23,15 @@ struct Cell {
   std::array<float, 3> fraction;
 };
 
+/// As brick_march::wholeBelow().
+std::int32_t wholeBelow(double at) {
+  const auto whole = std::int32_t(at);
+  return whole - std::int32_t(double(whole) > at);
+}
+
 Cell cellOf(const Vec3& place) {
-  const double x = std::floor(place[0]), y = std::floor(place[1]), z = std::floor(place[2]);
-  return {{std::int32_t(x), std::int32_t(y), std::int32_t(z)},
-          {float(place[0] - x), float(place[1] - y), float(place[2] - z)}};
+  const Coord voxel{wholeBelow(place[0]), wholeBelow(place[1]), wholeBelow(place[2])};
+  return {voxel, {float(place[0] - voxel.x), float(place[1] - voxel.y), float(place[2] - voxel.z)}};
 }
 
 /// Interpolates in a volume, to which it keeps a reference. Coordinates are relative to the
@@ -83,7 +88,15 @@ float VoxelSampler::value(const Corners& corners, Coord local) const {
 float VoxelSampler::interpolate(const Corners& corners, const Cell& cell) const {
   const Coord local = localOf(cell.voxel);
   float v[kCellCorners];
-  for (int c = 0; c < kCellCorners; ++c) v[c] = value(corners, local + stepToCorner(c));
+  constexpr int kLast = kBrickSide - 1;
+  if (local.x < kLast && local.y < kLast && local.z < kLast) {  // most cells lie in one brick
+    if (corners[0] == BrickIndex::kNone) return volume_.background;
+    const float* const first =
+        &volume_.values[std::size_t(corners[0]) * kBrickVoxels + voxelOffset(local)];
+    for (int c = 0; c < kCellCorners; ++c) v[c] = first[voxelOffset(stepToCorner(c))];
+  } else {
+    for (int c = 0; c < kCellCorners; ++c) v[c] = value(corners, local + stepToCorner(c));
+  }
   const auto between = [](float a, float b, float s) { return a + s * (b - a); };
   const auto [x, y, z] = cell.fraction;
   const float low = between(between(v[0], v[1], z), between(v[2], v[3], z), y);
@@ -124,9 +137,11 @@ class RayMarch {
     const int end =
         isBetween ? 1 : range.countTo(range.last) + (inScene.last < wanted.last ? 2 : 1);
     const PartRange inside = partsIn(t, scene_.step, range.first);
+    Way way{ray, range, inside, indexOf(range.first) - kSegmentParts,
+            range.first + scene_.view.before / scene_.step};
     int part = isBetween ? state.parts.divide(kSegmentParts) : kSegmentParts;
     while (part <= end * kSegmentParts && scene_.rule.open(state.ray))
-      part = advance(ray, range, inside, part, state);
+      part = advance(way, part, state);
   }
   /// The index of a sample, counted from where rays begin.
   static std::uint32_t indexOf(double sample) {
@@ -134,30 +149,56 @@ class RayMarch {
   }
 
  private:
+  /// What a ray has through all its samples, and the brick of the last one.
+  struct Way {
+    const Ray& ray;
+    const SampleRange& range;
+    PartRange inside;
+    std::uint32_t firstIndex;  ///< SampleNumber::index of part 0
+    double firstFromEye;       ///< number of the first sample, counted from the eye
+    Coord brick{};
+    const VoxelSampler::Corners* corners = nullptr;
+    bool hasBrick = false;
+    int endPart = -1;  ///< of the segment that was divided last, and the value there
+    float endValue = 0.0f;
+
+    void enter(const VoxelSampler& sampler, Coord entered) {
+      if (hasBrick && entered == brick) return;
+      brick = entered, corners = sampler.find(entered), hasBrick = true;
+    }
+  };
+
   /// Adds a part to the ray (RayParts); part kSegmentParts is the first sample of the range.
   /// \return the next part to visit
-  int advance(const Ray& ray, const SampleRange& range, const PartRange& inside, int part,
-              RayProgress& state) const {
+  int advance(Way& way, int part, RayProgress& state) const {
+    const Ray& ray = way.ray;
+    const SampleRange& range = way.range;
     const double fromFirst = double(part) / kSegmentParts - 1.0, sample = range.first + fromFirst;
     const Vec3 place = sum(ray.origin, scaled(ray.direction, sample * scene_.step));
     const Cell cell = cellOf(place);
     const auto brick = brickOf(cell.voxel);
-    const VoxelSampler::Corners* corners = sampler_.find(brick);
+    way.enter(sampler_, brick);
+    const VoxelSampler::Corners* const corners = way.corners;
     if (corners == nullptr && state.ray.last == RayState::kNone && !state.parts.divided) {
       const int behind = range.countTo(behindBrick(ray, brick, scene_.step)) + 1;
       return std::max(part + kSegmentParts, behind * kSegmentParts);
     }
-    const bool isThere = corners != nullptr && part >= inside.first && part <= inside.last;
-    const float value = isThere ? sampler_.interpolate(*corners, cell) : scene_.rule.background;
+    const bool isThere = corners != nullptr && part >= way.inside.first && part <= way.inside.last;
+    const float value = part == way.endPart ? way.endValue
+                        : isThere           ? sampler_.interpolate(*corners, cell)
+                                            : scene_.rule.background;
     const auto apart = std::uint32_t(state.parts.apart());
-    const SampleNumber number{float(sample + scene_.view.before / scene_.step),
-                              indexOf(range.first) + std::uint32_t(part - kSegmentParts), apart,
+    const SampleNumber number{float(way.firstFromEye + fromFirst),
+                              way.firstIndex + std::uint32_t(part), apart,
                               float(apart) / float(kSegmentParts)};
-    const auto shade = [&] {
-      return scene_.isShaded ? shadeAt(ray, place, *corners, brick) : Shade{};
-    };
-    return brick_march::addSample(scene_.rule, {nullptr, {}, {}, value, number}, part, state,
-                                  Adding<decltype(shade)>{shade});
+    const BrickSample added{nullptr, {}, {}, value, number};
+    const auto shade = [&] { return shadeAt(ray, place, *corners, brick); };
+    const int next = scene_.isShaded
+                         ? brick_march::addSample(scene_.rule, added, part, state,
+                                                  Adding<decltype(shade)>{shade})
+                         : brick_march::addSample(scene_.rule, added, part, state, UnlitSamples{});
+    if (next < part) way.endPart = part, way.endValue = value;
+    return next;
   }
   /// Adds samples that are lit by their gradients in the volume.
   template <class ShadeAt>

@@ -90,40 +90,56 @@ std::unique_ptr<Renderer> makeCpuRenderer(Draw draw) {
 }
 
 /// Draws a field on a CUDA device with one renderer for each rule between voxels. A renderer is
-/// made when it is needed, because each keeps data of its own on the device.
+/// made when it is needed, because each keeps data of its own on the device. Voxels that lie far apart
+/// are decoded at once, and drawn from a NanoVDB grid, which needs no table of the space between them.
 class CudaFieldRenderers final : public Renderer {
  public:
   CudaFieldRenderers(const Field& field, const Device& device, const RendererLimits& limits,
                      const RevoxeliseOptions& voxels)
       : field_(field), device_(device), limits_(limits), voxels_(voxels) {
-    (void)of(Between::kVoxels);
+    (void)of(isFarApart_ ? Between::kSum : Between::kVoxels);
   }
 
-  Image draw(const RenderOptions& options) override { return of(options.between).draw(options); }
+  Image draw(const RenderOptions& options) override { return checked(options).draw(options); }
   void drawOnDevice(const RenderOptions& options) override {
-    of(options.between).drawOnDevice(options);
+    checked(options).drawOnDevice(options);
   }
   void forget() override {
-    if (cells_) cells_->forget();
+    if (voxelsDrawn_) voxelsDrawn_->forget();
   }
   FrameStats stats() const override { return last_->stats(); }
 
  private:
+  Renderer& checked(const RenderOptions& options) {
+    if (options.shading && isFarApart_ && options.between == Between::kVoxels)
+      throw UsageError(
+          "ellipsoids that lie so far apart cannot be shaded on a GPU; draw them on the CPU");
+    return of(options.between);
+  }
   Renderer& of(Between between) {
-    auto& renderer = between == Between::kSum ? sums_ : cells_;
+    auto& renderer = between == Between::kSum ? sums_ : voxelsDrawn_;
     if (!renderer)
-      renderer =
-          (between == Between::kSum ? cuda::makeCudaSumRenderer : cuda::makeCudaCellRenderer)(
-              field_, device_, limits_, voxels_);
+      renderer = between == Between::kSum
+                     ? cuda::makeCudaSumRenderer(field_, device_, limits_, voxels_)
+                     : makeVoxels();
     last_ = renderer.get();
     return *renderer;
+  }
+  [[nodiscard]] std::unique_ptr<Renderer> makeVoxels() const {
+    if (!isFarApart_) return cuda::makeCudaCellRenderer(field_, device_, limits_, voxels_);
+    VolumeGrid decoded;
+    decoded.descriptor.transform = uniformTransform(1.0);  // pictures are drawn in the index space
+    decoded.volume = revoxelise(field_, voxels_);
+    return cuda::makeCudaNanoRenderer(makeNanoVolume(decoded, NanoValues::kFloat), device_,
+                                      limits_);
   }
 
   const Field& field_;
   const Device device_;
   const RendererLimits limits_;
   const RevoxeliseOptions voxels_;
-  std::unique_ptr<Renderer> sums_, cells_;
+  const bool isFarApart_ = liesFarApart(field_, voxels_.box);
+  std::unique_ptr<Renderer> sums_, voxelsDrawn_;
   Renderer* last_ = nullptr;
 };
 

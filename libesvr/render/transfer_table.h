@@ -102,7 +102,7 @@ struct SegmentSpan {
   /// Interval 0 lies below the table, and kIntervals + 1 above it.
   ESVR_HD static int intervalAt(float place) {
     const float above = place > -1.0f ? place : -1.0f;
-    return int(std::floor(above < float(kIntervals) ? above : float(kIntervals))) + 1;
+    return above < 0.0f ? 0 : int(above < float(kIntervals) ? above : float(kIntervals)) + 1;
   }
 };
 

@@ -25,6 +25,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 
 TEST_F(EsvrRender, EllipsoidsLookLikeTheirVoxels) {
   // Bytes may differ by one. The background is black, because the color of an almost transparent
@@ -41,6 +42,21 @@ TEST_F(EsvrRender, TheSumIsShownBetweenVoxelsWhereAskedFor) {
   EXPECT_GE(psnrOf(sum, picture("in.vdb", black)), 35.0);
   EXPECT_NE(sum.rgba, picture("in.esvr", black).rgba);
   expectRefused({"--between", "nothing"}, 2, "--between");
+}
+
+TEST_F(EsvrRender, AGridWithoutASumIsDrawnFromItsVoxelsWithAWarning) {
+  const std::string warning = "--between sum has no effect";
+  EXPECT_THAT(draw("in.vdb", "vdb.png", {"--between", "sum"}).err, HasSubstr(warning));
+  EXPECT_THAT(draw("in.vdb", "plain.png").err, Not(HasSubstr(warning)));
+  EXPECT_THAT(draw("in.esvr", "sum.png", {"--between", "sum"}).err, Not(HasSubstr(warning)));
+  EXPECT_EQ(readPng(folder_ / "vdb.png").rgba, readPng(folder_ / "plain.png").rgba);
+  for (const char* name : {"f.1.vdb", "f.2.vdb"})
+    std::filesystem::copy_file(folder_ / "in.vdb", folder_ / name);
+  const auto frames = draw("f.@.vdb", "f.@.png", {"--between", "sum"});
+  EXPECT_EQ(frames.exitCode, 0) << frames.err;
+  const auto at = frames.err.find(warning);
+  ASSERT_NE(at, std::string::npos);
+  EXPECT_EQ(frames.err.find(warning, at + 1), std::string::npos) << "once for all frames";
 }
 
 TEST_F(EsvrRender, AFileThatHoldsItsVoxelsIsDrawnFromThem) {

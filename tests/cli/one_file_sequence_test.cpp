@@ -110,6 +110,37 @@ TEST_F(OneFile, hasTheFramesByTheirNumbers) {
   EXPECT_EQ(report["frames"][9]["output"]["bytes"], reader.frames()[9].bytes);
 }
 
+TEST_F(OneFile, repeatsTheGridsOfFramesThatAreEqual) {
+  const auto write = [&](int frame, float value) {
+    writeFrame(frame, {{.voxels = test::cloud(12)},
+                       {.name = "heat", .voxels = test::softBall({0, 0, 0}, value)}});
+  };
+  write(1, 20.0f), write(2, 20.0f), write(3, 30.0f);
+  for (const Words& goal : std::vector<Words>{{"--size", "3000"}, {"--psnr", "40"}, {}}) {
+    Words words{at("in.@.vdb"), at("out.esvr"), "--device", "cpu", "-f", "--report", at("r.json")};
+    words.insert(words.end(), goal.begin(), goal.end());
+    const auto run = vdb2esvr(words);
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+    SequenceReader reader(at("out.esvr"));
+    const auto voxels = [&](std::int64_t frame, std::size_t grid) {
+      return decodeGrid(reader.read(frame).grids.at(grid)).values;
+    };
+    EXPECT_EQ(voxels(2, 0), voxels(1, 0));
+    EXPECT_EQ(voxels(2, 1), voxels(1, 1));
+    EXPECT_EQ(voxels(3, 0), voxels(1, 0)) << "one grid moves, the other one stands still";
+    EXPECT_NE(voxels(3, 1), voxels(1, 1));
+    const auto frames = reader.frames();
+    EXPECT_LT(frames[1].bytes, frames[0].bytes / 2 + 200) << "all that was stored is stored again";
+    const Json report = Json::parse(bytesOf("r.json"));
+    const auto isAsBefore = [&](std::size_t frame, std::size_t grid) {
+      return report["frames"][frame]["grids"][grid]["as_previous_frame"].get<bool>();
+    };
+    EXPECT_FALSE(isAsBefore(0, 0));
+    EXPECT_TRUE(isAsBefore(1, 0) && isAsBefore(1, 1) && isAsBefore(2, 0));
+    EXPECT_FALSE(isAsBefore(2, 1));
+  }
+}
+
 TEST_F(OneFile, hasTheSameBytesOnAnyNumberOfThreads) {
   writeFrames(1, 2 * kGroup + 1);
   ASSERT_EQ(convert({"--threads", "1"}).exitCode, 0);

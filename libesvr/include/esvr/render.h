@@ -215,8 +215,9 @@ class Renderer {
                                                            const RendererLimits& limits = {});
 
 /// Whether the ellipsoids of a field have so much empty space between them that the table of blocks
-/// of voxels, by which rays find bricks, would be too large. On the CPU, makeFieldRenderer() does
-/// without this table; on a CUDA device, it throws UsageError.
+/// of voxels, by which rays find bricks, would be too large. makeFieldRenderer() does without this
+/// table then: all voxels are decoded when they are first drawn. On a CUDA device, they have no levels
+/// of detail, and a shaded picture throws UsageError.
 /// \param wanted  the voxels that are drawn
 [[nodiscard]] bool liesFarApart(const Field& field, const Box& wanted);
 

@@ -205,6 +205,22 @@ TEST_P(FieldOnGpu, DrawsTheWidestPicture) {
   expectTheCpusPicture(randomField({.count = 300}), optionsFor({}, {16384, 9}));
 }
 
+// A table of the blocks between puffs over 60,000 voxels would take gigabytes.
+TEST_P(FieldOnGpu, DrawsEllipsoidsThatLieFarApart) {
+  Field field =
+      randomField({.count = 60, .extent = 60'000.0, .smallest = 3.0, .aspect = 2.0, .seed = 11});
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  for (float& intensity : e.intensity) intensity = 0.5f + 0.5f * std::abs(intensity);
+  RenderOptions o = optionsFor();
+  const Vec3 puff{e.center[0][17], e.center[1][17], e.center[2][17]};
+  o.camera.center = puff, o.camera.eye = {puff[0] + 10.0, puff[1] + 30.0, puff[2] + 60.0};
+  const auto renderer = makeFieldRenderer(field, device_);
+  EXPECT_LE(largestDifference(renderer->draw(o), makeFieldRenderer(field, Device{})->draw(o)),
+            kAsked);
+  o.shading = Shading{};
+  EXPECT_THROW((void)renderer->draw(o), UsageError);
+}
+
 TEST_P(FieldOnGpu, GivesTheSameBitsInEveryRun) {
   const Field field = randomField({.count = 5000, .extent = 40.0});
   const auto renderer = makeFieldRenderer(field, device_, {.depthParts = 3});
