@@ -195,6 +195,7 @@ std::vector<std::string> rowOfStored(const Listing& listing, const ListedGrid& n
           std::to_string(grid.activeVoxels),
           std::to_string(ellipsoids),
           textOf(grid.field.kernel),
+          grid.tone.isOn() ? cli::shortNumber(grid.tone.scale) : "-",
           cli::nameOf(grid.topology),
           std::to_string(cli::ownBytes(listing.summary, named.grid.index)),
           bytesPerEllipsoid(bytes, ellipsoids)};
@@ -224,7 +225,7 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const ListedGrid& 
 
 void printGrids(const Listing& listing) {
   cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "kernel, kappa",
-                    "active by", "bytes", "bytes each"});
+                    "tone", "active by", "bytes", "bytes each"});
   std::size_t place = listing.grids.size();
   for (const ListedGrid& part : listing.parts) {
     const ListedGrid& grid = listing.grids[part.place];

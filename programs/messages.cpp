@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <iostream>
 #include <ostream>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "esvr/grid.h"
@@ -57,6 +59,9 @@ std::string padded(const std::string& text, std::size_t width, bool flushLeft) {
 }  // namespace
 
 void Table::add(std::vector<std::string> row) {
+  if (row.size() != rows_.front().size())
+    throw std::logic_error("a row of a table has " + std::to_string(row.size()) +
+                           " cells, and its header " + std::to_string(rows_.front().size()));
   for (auto& cell : row) cell = printable(cell);
   rows_.push_back(std::move(row));
 }

@@ -57,6 +57,7 @@ class Log {
 class Table {
  public:
   explicit Table(std::vector<std::string> header) : rows_{std::move(header)} {}
+  /// \throws std::logic_error  the row has other columns than the header
   void add(std::vector<std::string> row);
   void print(std::ostream& out) const;
 

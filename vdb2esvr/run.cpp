@@ -8,6 +8,7 @@
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -193,17 +194,16 @@ class FileConversion {
            RunRecord& record) {
     const Twins twins = findTwins(options_, grids);
     ByteShares shares(options_, record.input, grids, twins, carried);
-    auto early = convertSmall(grids, twins);
-    for (std::size_t g = 0; g < grids.size(); ++g) {
-      if (cancelled())
+    auto made = convertSmall(grids, twins);
+    for (const std::size_t g : orderOf(grids))
+      if (!made[g] && !twins.contains(g) && !cancelled()) made[g] = convert(g, grids[g], shares);
+    for (const auto& [g, twin] : twins)
+      if (made[twin.of]) made[g] = twinOf(*made[twin.of], grids[g], twin);
+    for (std::size_t g = 0; g < grids.size(); ++g)
+      if (made[g])
+        record.grids.push_back(std::move(*made[g]));
+      else
         record.notFitted.push_back(grids[g].uniqueName);
-      else if (early[g])
-        record.grids.push_back(std::move(*early[g]));
-      else if (const auto twin = twins.find(g); twin != twins.end())
-        record.grids.push_back(twinOf(record.grids[twin->second.of], grids[g], twin->second));
-      else if (!convert(g, grids[g], shares, record))
-        record.notFitted.push_back(grids[g].uniqueName);
-    }
     collectVectors(record);
     record.interrupted = cancelled();
     if (record.interrupted && (!options_.keepsBest() || record.grids.empty()))
@@ -267,14 +267,27 @@ class FileConversion {
     return made;
   }
 
-  /// \return false if the run was interrupted before the fit had a result
-  bool convert(std::size_t g, const FittedGrid& fitted, ByteShares& shares, RunRecord& record) try {
+  /// The order in which grids are converted. Those that share a size begin with the one that takes the fewest
+  /// bytes for its voxels in the source, since it probably leaves most of its share to the others.
+  [[nodiscard]] std::vector<std::size_t> orderOf(const std::vector<FittedGrid>& grids) const {
+    std::vector<std::size_t> order(grids.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto bytesEach = [&](std::size_t g) {
+      const GridSummary& source = grids[g].source;
+      return double(source.storedBytes) / double(source.activeVoxels + 1);
+    };
+    if (options_.size || options_.ratio) std::ranges::stable_sort(order, {}, bytesEach);
+    return order;
+  }
+
+  /// \return nothing if the run was interrupted before the fit had a result
+  std::optional<ConvertedGrid> convert(std::size_t g, const FittedGrid& fitted,
+                                       ByteShares& shares) try {
     ProgressBar bar(fitted.uniqueName, options_.progress, options_.verbosity);
     options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    record.grids.push_back(convertToShare(g, fitted, shares));
-    return true;
+    return convertToShare(g, fitted, shares);
   } catch (const Cancelled&) {
-    return false;
+    return std::nullopt;
   }
 
   /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for

@@ -29,6 +29,7 @@ namespace {
 
 using test::InputVectors;
 using testing::AllOf;
+using testing::ContainsRegex;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
@@ -350,6 +351,7 @@ TEST_F(VectorConversion, IsSummarisedReportedAndListed) {
   EXPECT_EQ(report["input"]["bytes_converted"], report["input"]["bytes"]);
   const auto list = test::esvr2vdb({"--list", "-v", out()});
   EXPECT_THAT(list.out, AllOf(HasSubstr("vec3s"), HasSubstr("vector grid")));
+  EXPECT_THAT(list.out, ContainsRegex("velocity  .* -  .*-  .*-  +[0-9]+  +-")) << "columns";
 }
 
 TEST_F(VectorConversion, ComparesWithItsReference) {

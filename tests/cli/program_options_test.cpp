@@ -126,6 +126,24 @@ TEST_F(Vdb2EsvrOption, ratioBoundsTheFile) {
   }
 }
 
+TEST_F(Vdb2EsvrOption, sizeGoesToTheGridsThatNeedIt) {
+  std::vector<test::InputVoxel> rough = test::cloud(9), constant;
+  for (std::size_t i = 0; i < rough.size(); ++i)
+    rough[i].value = float(i * 2654435761u % 997) / 997.0f;
+  for (int v = 0; v < 32 * 32 * 32; ++v)
+    constant.push_back({{v / 1024, v / 32 % 32, v % 32}, 0.7f});
+  for (const bool first : {true, false}) {
+    std::vector<test::InputGrid> grids{{.name = "rough", .voxels = rough},
+                                       {.name = "constant", .voxels = constant}};
+    if (!first) std::swap(grids[0], grids[1]);
+    test::writeInput(at("in.vdb"), grids);
+    const Json report = convert({"--size", "4000"});
+    EXPECT_LE(sizeOf("out.esvr"), 4000u);
+    EXPECT_GE(sizeOf("out.esvr"), 3800u);
+    EXPECT_EQ(report["grids"][0]["name"], grids[0].name);
+  }
+}
+
 TEST_F(Vdb2EsvrOption, psnrIsReached) {
   // By value, because the bytes of a mask are larger for coarser sums.
   const auto reaching = [&](const char* psnr) { return quick({"--psnr", psnr}); };
