@@ -2,7 +2,8 @@
 #include <gtest/gtest.h>
 
 int main(int argc, char** argv) {
-  constexpr int kAllSkipped = 77;  // with which CTest shows a group as skipped (tests/CMakeLists.txt)
+  constexpr int kAllSkipped =
+      77;  // with which CTest shows a group as skipped (tests/CMakeLists.txt)
   testing::InitGoogleTest(&argc, argv);
   const int failed = RUN_ALL_TESTS();
   const testing::UnitTest& tests = *testing::UnitTest::GetInstance();
