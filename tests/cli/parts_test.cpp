@@ -1,7 +1,7 @@
 // Plan: a fit in chunks gives the same bytes in one run and in a run that was interrupted or
 // killed and continued. A folder of another run, of damaged parts, or of a running process is
 // refused. A volume is converted, written back and compared by processes whose memory is limited
-// to a third of its voxels. `ulimit -d` limits the heap and all private memory of a process, but
+// to less than its voxels take. `ulimit -d` limits the heap and all private memory of a process, but
 // not the files that it maps. The programs are run with so little memory that the voxels are in
 // files. The tests check that the results are the same, and that a folder which cannot hold the
 // files is refused by name.
@@ -160,7 +160,7 @@ TEST_F(Parts, followNoLinkInTheirFolder) {
   }
 }
 
-constexpr std::int32_t kSide = 66;        // bricks; the voxels take 589 MB
+constexpr std::int32_t kSide = 48;        // bricks; the voxels take 226 MB
 constexpr const char* kLimit = "190000";  // KB
 constexpr const char* kMaxMemory = "100MB";
 
@@ -187,7 +187,7 @@ test::ProgramRun limited(const std::string& program, const std::vector<std::stri
   return test::runProgram("/bin/sh", {"-c", line});
 }
 
-TEST(OutOfCore, SlowVolumeOfThreeTimesTheMemoryGoesThereAndBack) {
+TEST(OutOfCore, SlowVolumeLargerThanTheMemoryGoesThereAndBack) {
   const test::TemporaryFolder folder;
   const std::string in = folder / "in.vdb", file = folder / "out.esvr", back = folder / "back.vdb";
   writeGrids(in, {}, std::vector{denseGrid()}, {.constantTiles = false});
