@@ -180,7 +180,6 @@ std::vector<std::string> rowOfVector(const Listing& listing, const ListedGrid& n
           std::to_string(ellipsoids),
           "-",
           "-",
-          "-",
           std::to_string(bytes),
           "-"};
 }
@@ -215,7 +214,6 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const ListedGrid& 
           cli::valuesOf(grid),
           cli::activeVoxelsOf(grid),
           "carried",
-          "-",
           "-",
           "-",
           std::to_string(cli::ownBytes(listing.summary, number)),

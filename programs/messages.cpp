@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <iostream>
 #include <ostream>
+#include <stdexcept>
 #include <utility>
 
 #include "esvr/grid.h"
@@ -57,6 +58,8 @@ std::string padded(const std::string& text, std::size_t width, bool flushLeft) {
 }  // namespace
 
 void Table::add(std::vector<std::string> row) {
+  if (!rows_.empty() && row.size() > rows_.front().size())
+    throw std::logic_error("a row of a table has more cells than the table has columns");
   for (auto& cell : row) cell = printable(cell);
   rows_.push_back(std::move(row));
 }

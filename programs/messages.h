@@ -52,7 +52,7 @@ class Log {
 
 // Tables in the output of programs.
 
-/// Rows of equal length. The first column is text, aligned left; the others are numbers, aligned
+/// Rows of equal length; one that is longer than the header is a std::logic_error. The first column is text, aligned left; the others are numbers, aligned
 /// right.
 class Table {
  public:
