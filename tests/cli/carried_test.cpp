@@ -123,6 +123,12 @@ TEST_F(CarriedFile, ListsItsCarriedGridsInOrder) {
   EXPECT_LT(run.out.find("vec3s"), run.out.find("density[0]"));
   EXPECT_THAT(run.out, AllOf(HasSubstr("carried bytes"),
                              HasSubstr("int32: carried unchanged, Tree_int32_5_4_3")));
+  const auto lineAt = [&](const std::string& begin) {
+    const auto at = run.out.find('\n' + begin + ' ') + 1;
+    return run.out.substr(at, run.out.find('\n', at) - at);
+  };
+  EXPECT_EQ(lineAt("vec3s").size(), lineAt("grid").size()) << "its cells are below their titles";
+  EXPECT_THAT(lineAt("vec3s"), testing::EndsWith(" -"));
 }
 
 TEST_F(CarriedFile, GivesBackTheCarriedGridsThatAreNamed) {
