@@ -109,9 +109,7 @@ CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResul
   target.device = fit.chunks > 1 ? Device{} : wanted.device;
   auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
     if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    CompactResult made = compactGrid(grid, job.input.source, target);
-    keepMass(job, made.grid);
-    return made;
+    return compactGrid(grid, job.input.source, target);
   });
   if (found) return std::move(*found);
   const BestSoFar completion;
@@ -346,7 +344,11 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) const {
   double bestOver = 0.0;
   for (int trial = 0; trial < kMostRoundings && !search.ended(); ++trial) {
     Conversion made = stored(attempt.fit, attempt.grid, {.loss = -search.next()});
-    const double psnr = psnrOf(job_, made), over = psnr - *goal_.psnr;
+    const auto judged = unlessCancelled([&]() -> std::optional<double> {
+      if (isCancelled(job_)) return std::nullopt;
+      return keepMass(job_, made.grid);
+    });
+    const double psnr = judged ? *judged : psnrOf(job_, made), over = psnr - *goal_.psnr;
     const bool isBetter =
         !best || (bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver);
     if (isBetter) best = std::move(made), bestOver = over;
@@ -357,11 +359,11 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) const {
   return std::move(*best);
 }
 
-/// The quality that an attempt has after rounding.
-double EllipsoidSearch::qualityOf(const Attempt& attempt, const CompactResult& rounded) const {
+/// The quality that an attempt has after rounding. A grid that is seen gets the mass of its source.
+double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded) const {
   const auto judged = unlessCancelled([&]() -> std::optional<double> {
     if (!job_.judge) return std::nullopt;
-    return psnrOf(job_, rounded.grid);
+    return keepMass(job_, rounded.grid);
   });
   return judged.value_or(attempt.psnr - rounding_.factor * rounded.loss);
 }
@@ -567,7 +569,6 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
   std::optional<Conversion> best;
   double quality = 0.0, each = price_;
   const auto take = [&](Attempt attempt, CompactResult now) {
-    quality = qualityOf(attempt, now);
     best = conversionOf(std::move(attempt.fit), std::move(now));
     best->decisions.bothSigns = bothSigns_;
   };
@@ -588,8 +589,13 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
           double(compacted(*attempt, {.loss = rounding_.usualLoss}).bytes) / countOf(*attempt),
           kMoreEach * each);
     attempts_.assign(1, *attempt);  // the next fit may continue it
-    if (isSmall && (!best || qualityOf(*attempt, *now) > quality))
-      take(std::move(*attempt), std::move(*now));
+    if (isSmall) {
+      const double reached = completed(*attempt, *now);
+      if (!best || reached > quality) {
+        quality = reached;
+        take(std::move(*attempt), std::move(*now));
+      }
+    }
     if (isLast) break;
   }
   if (best || !draft_->cancelled()) return best;
@@ -598,6 +604,7 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
   last.fit.end = FitEnd::kCancelled;
   auto now = filled(last);
   if (!now || needed_ > *goal_.bytes) throw Cancelled();
+  (void)completed(last, *now);
   take(std::move(last), std::move(*now));
   return best;
 }

@@ -98,7 +98,7 @@ class EllipsoidSearch {
   [[nodiscard]] const Attempt* startFor(double count) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt) const;
-  [[nodiscard]] double qualityOf(const Attempt& attempt, const CompactResult& rounded) const;
+  [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void draftNearPsnr();
   void decideSigns();

@@ -80,11 +80,21 @@ double Judge::forTones(SparseVolume volume) const {
 
 // ---- The total mass
 
-double Judge::massOf(SparseVolume tones) const {
-  toValues(tones);
+/// The mass of the values of tones that are multiplied by a factor.
+double Judge::massOf(const SparseVolume& tones, double factor) const {
   std::vector<double> parts(tones.brickCount());
+  SparseVolume values;
+  if (halfs_) {
+    values = tones;
+    for (float& tone : values.values) tone = float(tone * factor);
+    toValues(values);
+  }
   parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
-    for (const float value : tones.brickValues(b)) parts[b] += value;
+    if (halfs_)
+      for (const float value : values.brickValues(b)) parts[b] += value;
+    else
+      for (const float u : tones.brickValues(b))
+        parts[b] += std::clamp(tone_.value(float(u * factor)), range_.min, range_.max);
   });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
@@ -98,26 +108,40 @@ double Judge::massFactor(const SparseVolume& reference, const SparseVolume& deco
       parts[b] += tone_.isOn() ? u * std::cosh(u / s) : u;
   });
   const double growth = std::accumulate(parts.begin(), parts.end(), 0.0);
-  const double missing = massOf(reference) - massOf(decoded);
-  // A larger factor would change what is seen more than the missing mass does.
-  constexpr double kMostChange = 0.05;
-  if (!(std::abs(missing) <= kMostChange * growth)) return 1.0;
-  return 1.0 + missing / growth;
+  // Values that are clamped are not in the derivative, so that one step does not suffice where many are. A
+  // factor farther from 1 would change what is seen more than the missing mass does.
+  constexpr int kSteps = 3;
+  constexpr double kMostChange = 0.05, kEnough = 1e-5;
+  const double wanted = massOf(reference, 1.0);
+  double factor = 1.0;
+  for (int n = 0; n < kSteps; ++n) {
+    const double change = (wanted - massOf(decoded, factor)) / growth;
+    if (!(std::abs(factor + change - 1.0) <= kMostChange)) return factor;
+    factor += change;
+    if (std::abs(change) < kEnough) break;
+  }
+  return factor;
 }
 
-void keepMass(const Job& job, StoredGrid& grid) {
-  constexpr int kSteps = 2;  // clamps and rounding are not in the derivative
-  constexpr double kEnough = 1e-4;
-  if (!seesPictures(job) || grid.quantised.empty()) return;
-  for (int n = 0; n < kSteps; ++n) {
-    const double factor = job.judge->massFactor(
-        job.input.source, decodeGrid(grid, {.memory = memoryOf(job.input.source)}));
-    if (std::abs(factor - 1.0) < kEnough) return;
+double keepMass(const Job& job, StoredGrid& grid) {
+  const auto decoded = [&] { return decodeGrid(grid, {.memory = memoryOf(job.input.source)}); };
+  if (!seesPictures(job) || grid.quantised.empty()) return psnrOf(job, decoded());
+  // Decoded sums are clamped to the range of the source, so that a factor far from 1 is found in two steps.
+  constexpr int kMostSteps = 2;
+  constexpr double kFar = 0.005;
+  for (int step = 1;; ++step) {
+    SparseVolume tones = decoded();
+    const double factor = job.judge->massFactor(job.input.source, tones);
     for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
       grid.quantised[c].lattice.intensityStep *= factor;
       grid.field.chunks[c].ellipsoids = dequantise(grid.quantised[c]);
     }
     grid.activeThreshold = float(grid.activeThreshold * factor);
+    if (std::abs(factor - 1.0) > kFar && step < kMostSteps) continue;
+    parallelFor(std::size_t{0}, tones.brickCount(), [&](std::size_t b) {
+      for (float& tone : tones.brickValues(b)) tone = float(tone * factor);
+    });
+    return psnrOf(job, std::move(tones));
   }
 }
 

@@ -38,7 +38,7 @@ class Judge {
 
  private:
   void toValues(SparseVolume& volume) const;
-  [[nodiscard]] double massOf(SparseVolume tones) const;
+  [[nodiscard]] double massOf(const SparseVolume& tones, double factor) const;
 
   const SparseVolume& values_;
   ToneCurve tone_;
@@ -70,7 +70,8 @@ void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded
 /// Scales the sum of a quantised grid that is judged by what is seen, so that its total mass is the source's. Errors of
 /// tones have a mean of about 0, and those of the values that they stand for do not. The bytes stay as they are.
 /// \param grid  holds tones like values, before setTone()
-void keepMass(const Job& job, StoredGrid& grid);
+/// \return the quality of the grid then, dB; clamps of the few values that reach the end of the range are not counted
+[[nodiscard]] double keepMass(const Job& job, StoredGrid& grid);
 
 /// The tones of a volume.
 [[nodiscard]] SparseVolume tonesOf(const SparseVolume& volume, ToneCurve tone);

@@ -239,7 +239,9 @@ TEST_F(Vdb2Esvr, keepsTheFileWhereOnlyTheTableCannotBePrinted) {
 class Interrupted : public Vdb2Esvr {
  protected:
   [[nodiscard]] test::ProgramRun interrupted() const {
-    test::writeInput(in(), {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
+    test::writeInput(in(), {{.voxels = softBall({})},
+                            {.name = "heat", .voxels = softBall({}, 2.0f)},
+                            {.name = "copy", .voxels = softBall({})}});
     return test::runInterrupted(
         VDB2ESVR, {in(), out(), "--seconds", "60", "--representation", "ellipsoids", "-v"},
         " left\n");
