@@ -136,7 +136,9 @@ double keepMass(const Job& job, StoredGrid& grid) {
       grid.quantised[c].lattice.intensityStep *= factor;
       grid.field.chunks[c].ellipsoids = dequantise(grid.quantised[c]);
     }
-    grid.activeThreshold = float(grid.activeThreshold * factor);
+    if (grid.activeThreshold >
+        0.0f)  // a negative one, by which all voxels are active, may be the lowest float
+      grid.activeThreshold = float(grid.activeThreshold * factor);
     if (std::abs(factor - 1.0) > kFar && step < kMostSteps) continue;
     parallelFor(std::size_t{0}, tones.brickCount(), [&](std::size_t b) {
       for (float& tone : tones.brickValues(b)) tone = float(tone * factor);

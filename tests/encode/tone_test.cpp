@@ -126,6 +126,16 @@ TEST(Tone, IsNotUsedWhereItDoesNotServe) {
   EXPECT_FALSE(tube.grid.tone.isOn());  // its values differ too little
 }
 
+TEST(Tone, KeepsAMaskWithTheMass) {
+  const SparseVolume volume = smoke();
+  const Conversion made = converted(volume, {.goal = PictureGoal{30.0},
+                                             .representation = Representation::kEllipsoids,
+                                             .storage = {.activity = Activity::kExact}});
+  const SparseVolume decoded = decodeGrid(made.grid);
+  EXPECT_EQ(activeVoxelCount(decoded), activeVoxelCount(volume));
+  EXPECT_EQ(compareVolumes(volume, decoded).iou, 1.0);
+}
+
 TEST(Tone, KeepsTheTotalMass) {
   const SparseVolume volume = smoke();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
