@@ -15,7 +15,8 @@ namespace esvr::vdb2esvr {
 
 /// Every grid gets the few bytes that the smallest one takes, and grids share the others by their
 /// active voxels. A frame of a sequence without active voxels has no size to keep to. Bytes that a grid
-/// does not use go to those that are converted after it. Twins of a grid have no share; the bytes of their records are reserved.
+/// does not use go to those that are converted after it. Twins of a grid have no share; the bytes of their
+/// records are reserved.
 class ByteShares {
  public:
   /// \param carried  grids that the file holds unchanged

@@ -86,7 +86,7 @@ struct ConvertedGrid {
   std::optional<SharedBytes> shared;  ///< nothing if it shares nothing
   std::optional<NamedGrid> twinOf;    ///< id of the grid that this one is a twin of
   std::string sameAs;                 ///< unique name of that grid
-  std::optional<SourceKey> source;    ///< of a grid of a group of frames
+  std::optional<SourceKey> source;    ///< the key of what was read, in a group of frames
   bool asBefore = false;              ///< it is the grid of the previous frame
   PhaseSeconds seconds;
 

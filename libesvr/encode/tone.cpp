@@ -234,7 +234,7 @@ void measureLayers(const ConvertInput& input, StoredGrid& grid) {
 namespace {
 
 struct Magnitudes {
-  double least = std::numeric_limits<double>::infinity();        ///< of all active values
+  double least = std::numeric_limits<double>::infinity();        ///< magnitude of an active value
   double leastAbove0 = std::numeric_limits<double>::infinity();  ///< infinite if all are 0
 };
 
