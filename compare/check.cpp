@@ -128,7 +128,12 @@ std::set<DifferenceKind> parseKinds(const std::string& list) {
 }
 
 /// Reads a limit. Limits on errors in value units must be positive or 0; others are any number.
-cli::ErrorBound limitOf(const Figure& figure, const std::string& text) {
+cli::ErrorBound limitOf(const Figure& figure, const std::string& text, CheckOptions& options) {
+  if (figure.id == FigureId::kRelativeError) {
+    const cli::RelativeBound bound = cli::parseRelativeBound(figure.option, text);
+    options.relativeFloor = bound.floor;
+    return {.amount = bound.share};
+  }
   if (figure.inValueUnits && text != "0") return cli::parseErrorBound(figure.option, text);
   const auto amount = cli::parseNumber(text);
   if (!amount)
@@ -139,7 +144,7 @@ cli::ErrorBound limitOf(const Figure& figure, const std::string& text) {
 void readLimits(const Arguments& a, CheckOptions& options) {
   for (const Figure& figure : allFigures())
     if (const auto text = a.find<std::string>(figure.option))
-      options.limits[std::size_t(figure.id)] = limitOf(figure, *text);
+      options.limits[std::size_t(figure.id)] = limitOf(figure, *text, options);
   if (const auto size = a.find<std::string>("max-bytes"))
     options.maxBytes = cli::parseByteSize("max-bytes", *size);
   if (const auto kinds = a.find<std::string>("fail-on")) options.failOn = parseKinds(*kinds);

@@ -400,7 +400,9 @@ class Comparison {
     if (ssim_) exact.ssim = 1.0;
     grid.figures = figuresOf(exact);
     const auto distance = std::size_t(FigureId::kMeshDistance);
+    const auto relative = std::size_t(FigureId::kRelativeError);
     if (options_.limits[distance]) grid.figures[distance] = 0.0;
+    if (options_.limits[relative]) grid.figures[relative] = 0.0;
     record.grids.push_back(std::move(grid));
   }
 
@@ -431,6 +433,7 @@ class Comparison {
                         .transmittance = isLookedThrough(a.descriptor.gridClass, a.volume)});
     grid.figures = figuresOf(grid.metrics);
     addMeshDistance(grid, a, b);
+    addRelativeError(grid, a.volume, b.volume);
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
     addDifferences(compareInactive(a.inactive, b.inactive), grid);
     grid.range = valueRangeOf(a.volume);
@@ -465,6 +468,7 @@ class Comparison {
                               .figures = figuresOf(m),
                               .differences = backgroundDifferences(a, b, c),
                               .range = range});
+      addRelativeError(record.grids.back(), a.components[c], b.components[c]);
       addTemporal(record.grids.back(), {a.components[c], b.components[c], peak});
     }
   }
@@ -489,6 +493,12 @@ class Comparison {
     const auto figure = std::size_t(FigureId::kMeshDistance);
     if (options_.limits[figure] && a.descriptor.gridClass == GridClass::kLevelSet)
       grid.figures[figure] = meshDistance(a, b).voxels;
+  }
+
+  void addRelativeError(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b) const {
+    const auto figure = std::size_t(FigureId::kRelativeError);
+    if (options_.limits[figure])
+      grid.figures[figure] = largestRelativeError(a, b, options_.relativeFloor).share;
   }
 
   void addTemporal(CheckedGrid& grid, const ComparedVolumes& volumes) const {

@@ -68,6 +68,16 @@ constexpr std::array<Figure, kFigureCount> kFigures{{
      false,
      true,
      {.relative = 0.02}},
+    {FigureId::kRelativeError,
+     "relative_error",
+     "max-relative-error",
+     "relative error",
+     "largest error relative to the value of each voxel: 1%, or 1%,0.001 if it may be as large as "
+     "for "
+     "0.001 where values are smaller; measured if there is a limit on it",
+     false,
+     false,
+     {.relative = 0.02}},
     {FigureId::kP999Error,
      "p999_error",
      "max-p999-error",

@@ -18,13 +18,14 @@ enum class FigureId {
   kPsnrT10,
   kPsnrTemporal,
   kMaxError,
+  kRelativeError,
   kP999Error,
   kIou,
   kSsim,
   kMassError,
   kMeshDistance
 };
-inline constexpr std::size_t kFigureCount = 12;
+inline constexpr std::size_t kFigureCount = 13;
 
 /// The default tolerance of a figure against a baseline.
 struct Slack {

@@ -78,6 +78,22 @@ ErrorBound parseErrorBound(const std::string& option, const std::string& text) {
   return {relative ? number->value / kPercent : number->value, relative};
 }
 
+RelativeBound parseRelativeBound(const std::string& option, const std::string& text) {
+  const auto parts = splitText(text, ',');
+  const auto refuse = [&] {
+    return UsageError("--" + option +
+                      " must be a share below 100% and, after a comma, a magnitude above 0, " +
+                      "such as 1% or 1%,0.001, not '" + text + "'");
+  };
+  if (parts.size() > 2) throw refuse();
+  RelativeBound bound{parseErrorBound(option, parts[0]).amount};
+  if (!(bound.share < 1.0)) throw refuse();
+  if (parts.size() == 1) return bound;
+  bound.floor = parseNumber(parts[1]);
+  if (!bound.floor || !(*bound.floor > 0.0) || !std::isfinite(float(*bound.floor))) throw refuse();
+  return bound;
+}
+
 Box parseBox(const std::string& text, const std::string& option) {
   const auto refuse = [&](const char* why) {
     return UsageError("--" + option + " must be x0,y0,z0,x1,y1,z1, six whole numbers: '" + text +

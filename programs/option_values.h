@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <initializer_list>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,16 @@ struct ErrorBound {
 /// Parses "0.01", or "1%" for a share of the range of values.
 /// \throws UsageError  the text is not of this form, or not above 0; the message names the option
 [[nodiscard]] ErrorBound parseErrorBound(const std::string& option, const std::string& text);
+
+/// A bound relative to the magnitude of each value.
+struct RelativeBound {
+  double share = 0.0;             ///< below 1
+  std::optional<double> floor{};  ///< magnitude below which the bound does not fall, above 0
+};
+
+/// Parses a share such as "1%" or "0.01", and after a comma a magnitude: "1%,0.001".
+/// \throws UsageError  the text is not of this form; the message names the option
+[[nodiscard]] RelativeBound parseRelativeBound(const std::string& option, const std::string& text);
 
 /// Parses "x0,y0,z0,x1,y1,z1": the lowest and the highest voxel, both inside the box.
 /// \throws UsageError  the text is not of this form, or the box is empty

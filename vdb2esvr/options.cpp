@@ -77,24 +77,6 @@ void readMaxError(const std::string& text, Options& options) {
   }
 }
 
-/// Reads --max-relative-error, such as "1%" or "1%,0.001".
-RelativeBoundGoal relativeBoundIn(const std::string& text) {
-  const std::string option = "max-relative-error";
-  const auto parts = cli::splitText(text, ',');
-  const auto refuse = [&] {
-    return UsageError("--" + option +
-                      " must be a share below 100% and, after a comma, a magnitude above 0, " +
-                      "such as 1% or 1%,0.001, not '" + text + "'");
-  };
-  if (parts.size() > 2) throw refuse();
-  RelativeBoundGoal goal{cli::parseErrorBound(option, parts[0]).amount};
-  if (!(goal.share < 1.0)) throw refuse();
-  if (parts.size() == 1) return goal;
-  goal.floor = cli::parseNumber(parts[1]);
-  if (!goal.floor || !(*goal.floor > 0.0) || !std::isfinite(float(*goal.floor))) throw refuse();
-  return goal;
-}
-
 /// Reads the values of --psnr and --max-error, such as "40" or "40,density=50": the value without a
 /// name is that of all grids that are not named.
 void readGridGoals(const cli::Arguments& a, Options& options) {
@@ -260,7 +242,8 @@ Goal commonGoal(const Arguments& a, const Options& options) {
   if (const auto text = a.find<std::string>("max-relative-error")) {
     refuseWith(a, "max-relative-error",
                {"picture-psnr", "psnr", "count", "seconds", "size", "ratio", "paper"});
-    return relativeBoundIn(*text);
+    const cli::RelativeBound bound = cli::parseRelativeBound("max-relative-error", *text);
+    return RelativeBoundGoal{bound.share, bound.floor};
   }
   if (options.picturePsnr) {
     refuseWith(a, "picture-psnr", {"psnr", "seconds", "size", "ratio", "paper"});

@@ -217,6 +217,43 @@ double psnrOverBox(const SparseVolume& reference, const SparseVolume& candidate,
   return psnr(c.mseBox(), c.peak);
 }
 
+// Errors relative to each value.
+
+double leastMagnitude(const SparseVolume& volume) {
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const double magnitude = std::abs(double(volume.brickValues(b)[std::size_t(v)]));
+      if (volume.active[b].test(v) && magnitude > 0.0) least = std::min(least, magnitude);
+    }
+  return least;
+}
+
+RelativeError largestRelativeError(const SparseVolume& reference, const SparseVolume& candidate,
+                                   std::optional<double> floor) {
+  using Range = tbb::blocked_range<std::size_t>;
+  const double least = floor ? *floor : leastMagnitude(reference);
+  const auto pairs = metrics::pairBricks(reference, candidate);
+  const auto errorAt = [&](const BrickPair& pair, int v) {
+    const double error = std::abs(pair.errorAt(v));
+    if (error == 0.0) return RelativeError{};
+    const double share = error / std::max(std::abs(double(pair.referenceAt(v))), least);
+    return RelativeError{std::isnan(share) ? std::numeric_limits<double>::infinity() : share,
+                         pair.voxelAt(v)};
+  };
+  const auto larger = [](const RelativeError& a, const RelativeError& b) {
+    return b.share > a.share ? b : a;
+  };
+  return parallelDeterministicReduce(
+      Range(0, pairs.size()), RelativeError{},
+      [&](const Range& range, RelativeError largest) {
+        for (std::size_t i = range.begin(); i != range.end(); ++i)
+          for (int v = 0; v < kBrickVoxels; ++v) largest = larger(largest, errorAt(pairs[i], v));
+        return largest;
+      },
+      larger);
+}
+
 // Vectors.
 
 namespace {

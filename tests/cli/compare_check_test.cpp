@@ -146,6 +146,18 @@ TEST_F(CompareCheck, takesErrorsAsAShareOfTheRange) {
   EXPECT_EQ(check("off.vdb", {"--max-error", "0.9%"}).exitCode, 4);
 }
 
+// An error of 0.01 is 2 % of a half, and a larger share of the smallest values.
+TEST_F(CompareCheck, boundsTheErrorRelativeToEachValue) {
+  write("off.vdb", {drifted(), heat()});
+  EXPECT_EQ(check("off.vdb", {"--max-relative-error", "2.1%,0.5"}).exitCode, 0);
+  const auto run = check("off.vdb", {"--max-relative-error", "1.9%,0.5"});
+  EXPECT_EQ(run.exitCode, 4);
+  EXPECT_THAT(run.err, HasSubstr("relative error 0.02, --max-relative-error 0.019"));
+  EXPECT_EQ(check("off.vdb", {"--max-relative-error", "2.1%"}).exitCode, 4);
+  EXPECT_EQ(check("ref.vdb", {"--max-relative-error", "1e-9"}).exitCode, 0) << "the same bytes";
+  EXPECT_EQ(check("off.vdb", {"--max-relative-error", "100%"}).exitCode, 2);
+}
+
 TEST_F(CompareCheck, boundsTheFilesBytes) {
   EXPECT_EQ(check("ref.vdb", {"--max-bytes", "1MB"}).exitCode, 0);
   const auto run = check("ref.vdb", {"--max-bytes", "100"});

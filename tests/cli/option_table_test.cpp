@@ -177,6 +177,7 @@ Table checkTests() {
           {"--max-error", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--max-mass-error", "CompareLimit.passesOrFailsWithTheFigure"},
           {"--max-p999-error", "CompareLimit.passesOrFailsWithTheFigure"},
+          {"--max-relative-error", "CompareCheck.boundsTheErrorRelativeToEachValue"},
           {"--max-mesh-distance", "CompareCheck.boundsTheDistanceOfTheSurfacesOfLevelSets"},
           {"--max-memory", "CompareCheck.refusesWhatTakesMoreMemoryThanAllowed"},
           {"--min-iou", "CompareLimit.passesOrFailsWithTheFigure"},

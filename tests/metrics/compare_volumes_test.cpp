@@ -48,6 +48,30 @@ struct RandomCase {
 
 class AgainstDense : public testing::TestWithParam<RandomCase> {};
 
+TEST_P(AgainstDense, theRelativeErrorAgreesWithThePlainLoops) {
+  const RandomCase c = GetParam();
+  const auto a = randomVolume({.seed = c.seed, .background = c.backgroundA});
+  const auto b = randomVolume({.seed = c.seed + 100, .brickRange = 3, .background = c.backgroundB});
+  for (const std::optional<double> floor : {std::optional<double>{}, {0.3}}) {
+    const double least = floor.value_or(leastMagnitude(a));
+    double largest = 0.0;
+    for (const SparseVolume* in : {&a, &b})  // the bricks of either
+      for (std::size_t brick = 0; brick < in->brickCount(); ++brick)
+        for (int v = 0; v < kBrickVoxels; ++v) {
+          const Coord at = in->brickCorner(brick) + voxelLocal(v);
+          const double value = double(valueAt(a, at));
+          const double error = std::abs(double(valueAt(b, at)) - value);
+          largest = std::max(largest, error / std::max(std::abs(value), least));
+        }
+    const RelativeError found = largestRelativeError(a, b, floor);
+    EXPECT_DOUBLE_EQ(found.share, largest);
+    const double value = double(valueAt(a, found.at));
+    EXPECT_DOUBLE_EQ(std::abs(double(valueAt(b, found.at)) - value),
+                     largest * std::max(std::abs(value), least));
+  }
+  EXPECT_EQ(largestRelativeError(a, a, {}).share, 0.0);
+}
+
 TEST_P(AgainstDense, everyMetricAgreesWithThePlainLoops) {
   const RandomCase c = GetParam();
   const auto a = randomVolume({.seed = c.seed, .background = c.backgroundA});

@@ -111,6 +111,22 @@ struct VolumeMetrics {
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] double valueRangeOf(const SparseVolume& reference);
 
+// The error relative to each value.
+
+struct RelativeError {
+  double share = 0.0;  ///< |error| / max(|value|, floor); infinite if it is not a number
+  Coord at;            ///< the first voxel that has it; the origin if there is no error
+};
+
+/// The largest relative error of a voxel in the bricks of either volume.
+/// \param floor  above 0; nothing: leastMagnitude() of the reference
+[[nodiscard]] RelativeError largestRelativeError(const SparseVolume& reference,
+                                                 const SparseVolume& candidate,
+                                                 std::optional<double> floor);
+
+/// The smallest magnitude above 0 of the active values; infinity if all are 0.
+[[nodiscard]] double leastMagnitude(const SparseVolume& volume);
+
 /// 10 log10(peak^2 / mse) in dB; +inf for mse = 0.
 [[nodiscard]] double psnr(double mse, double peak);
 
