@@ -114,13 +114,29 @@ void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
 }  // namespace
 
 VoxelLayer exactLayer(const SparseVolume& volume) {
-  VoxelLayer layer;
-  layer.palette = paletteOf(volume);
-  layer.form = !layer.palette.empty() ? VoxelForm::kPalette
-               : allHalves(volume)    ? VoxelForm::kHalf
-                                      : VoxelForm::kFloat;
-  fill(volume, RoundedSigns::kMayChange, layer);
-  return layer;
+  const auto layerOf = [&](VoxelForm form, std::vector<float> palette = {}) {
+    VoxelLayer layer;
+    layer.form = form;
+    layer.palette = std::move(palette);
+    fill(volume, RoundedSigns::kMayChange, layer);
+    return layer;
+  };
+  const auto bytesOf = [](const VoxelLayer& layer) {
+    return codec::codeWithin(codec::chooseModel(layer), UINT64_MAX, layer).bytes +
+           layer.palette.size() * sizeof(float);
+  };
+  std::vector<float> palette = paletteOf(volume);
+  const auto direct = [&] {
+    return layerOf(allHalves(volume) ? VoxelForm::kHalf : VoxelForm::kFloat);
+  };
+  if (palette.empty()) return direct();
+  // The values of a palette take four bytes each. Where each of them is that of many voxels, a palette saves more.
+  constexpr std::uint64_t kVoxelsOfAValue = 64;
+  const bool isRepaid = palette.size() * kVoxelsOfAValue <= activeVoxelCount(volume);
+  VoxelLayer indexed = layerOf(VoxelForm::kPalette, std::move(palette));
+  if (isRepaid) return indexed;
+  VoxelLayer plain = direct();
+  return bytesOf(plain) < bytesOf(indexed) ? plain : indexed;
 }
 
 // ---- Layers within a bound

@@ -60,6 +60,15 @@ TEST(ExactLayer, HoldsHalvesAsHalves) {
               VoxelForm::kHalf);
 }
 
+// 4,096 voxels of about 2,300 values: a palette of them would take 9,200 bytes, and all halves take 8,192.
+TEST(ExactLayer, HasNoPaletteThatTakesMoreThanItSaves) {
+  test::Random random(11);
+  expectExact(
+      test::volumeOf({}, 2, 1.0f,
+                     [&](Coord) { return codec::nearestHalf(float(random(0.0, 60000.0))); }),
+      VoxelForm::kHalf);
+}
+
 TEST(ExactLayer, HoldsAnyFloat) {
   int n = 0;
   const float extremes[] = {-0.0f, 0.0f, std::numeric_limits<float>::max(),
@@ -78,7 +87,7 @@ TEST(ExactLayer, KeepsActiveBackgroundAndInactiveValues) {
     volume.active[b] = {};
     volume.active[b].set(int(b) % kBrickVoxels);
   }
-  expectExact(volume, VoxelForm::kPalette);
+  expectExact(volume, VoxelForm::kFloat);
 }
 
 TEST(BoundedLayer, KeepsSignsWithinItsBoundIfAsked) {
