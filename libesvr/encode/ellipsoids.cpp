@@ -55,27 +55,28 @@ Representation representationOf(const Job& job) {
 }
 
 double effortFactor(int effort) {
-  return std::pow(effort < kUsualEffort ? 2.0 : 1.5, effort - kUsualEffort);
+  constexpr double kStep = 1.6;
+  return std::pow(kStep, effort - kUsualEffort);
 }
 
 Plan planOf(const Job& job) {
   const Tuning& tuning = kTuning;
   const int effort = job.options.effort;
-  const double factor = effortFactor(effort);
   const double wanted = plannedIterations(job.options.fit);
   const double bricks = double(std::max<std::size_t>(job.input.source.brickCount(), 1));
   const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;
-  const double share = onGpu ? 1.0 : std::min(1.0, tuning.bricksOfWholeFit / bricks);
+  const double affordable = onGpu ? 1.0 : tuning.bricksOfWholeFit / bricks;
+  const double most = std::max(effortFactor(effort), 1.0),
+               least = std::min(effortFactor(effort), 1.0);
+  const double usual = wanted * std::min(1.0, most * affordable);
+  const double shortest = std::min<double>(tuning.leastShortIterations, wanted);
   Plan plan;
-  plan.wholeIterations = std::uint32_t(std::max(std::ceil(factor * share * wanted), 1.0));
-  plan.fitsInTime = plan.wholeIterations >= std::min<double>(tuning.leastShortIterations, wanted);
-  plan.wholeIterations = std::max(
-      plan.wholeIterations, std::uint32_t(std::min<double>(tuning.leastShortIterations, wanted)));
+  plan.fitsInTime = effort > kLeastEffort && usual >= shortest;
+  plan.wholeIterations = std::uint32_t(std::ceil(std::max({least * usual, shortest, 1.0})));
   plan.shortIterations = std::min(plan.wholeIterations,
                                   std::clamp(plan.wholeIterations / 4, tuning.leastShortIterations,
                                              tuning.mostShortIterations));
-  const bool thorough = job.options.fit.preset == Preset::kHigh || effort > kUsualEffort;
-  plan.wholeFits = thorough ? 3 : 2;
+  plan.wholeFits = job.options.fit.preset == Preset::kHigh ? 3 : 2;
   return plan;
 }
 
@@ -104,6 +105,7 @@ double lastPsnr(const FitResult& fit) { return fit.curve.empty() ? 0.0 : fit.cur
 CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
                           CompactOptions target) {
   const FitOptions& wanted = job.options.fit;
+  if (job.judge) target.layerErrors = false;  // those of the values are measured at the end
   target.box = wanted.box;
   target.peak = wanted.peak;
   target.device = fit.chunks > 1 ? Device{} : wanted.device;
@@ -199,6 +201,9 @@ constexpr std::uint64_t kRefillDivisor = 100;
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kNarrowestLoss = 0.01,
                  kPsnrSpare = 0.12;
 constexpr int kMostRoundings = 4;
+/// Factor by which a whole fit may be expected to gain more than one of 400 iterations over one of 100, unless many
+/// voxels saturate (dragon has 200 iterations, and gains as much).
+constexpr double kMostBehind = 2.5;
 /// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
 constexpr double kMinSlopeRatio = 1.15, kMinSlope = kDbPerDoubling / 2.0;
 
@@ -224,9 +229,6 @@ EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
       saturates_(saturates(job.input.source)),
       rounding_(isToned(job) ? kTuning.tonedRounding : kTuning.rounding),
       margin_(compact_ ? compactMargin(rounding_.usualLoss * rounding_.factor) : kFloat32Margin),
-      behind_(isToned(job) ? kTuning.tonedShortFitBehind
-              : saturates_ ? kTuning.shortFitBehindSaturated
-                           : kTuning.shortFitBehind),
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
@@ -370,6 +372,19 @@ double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded
 
 // ---- Short fits
 
+/// Quality of a whole fit less that of a short one, dB. The error that iterations leave falls with their number.
+double EllipsoidSearch::behind() const {
+  const double usual = isToned(job_) ? kTuning.tonedShortFitBehind
+                       : saturates_  ? kTuning.shortFitBehindSaturated
+                                     : kTuning.shortFitBehind;
+  const auto gain = [](double from, double to) { return 1.0 / from - 1.0 / to; };
+  const double wholeLength = plan_.wholeIterations, shortLength = plan_.shortIterations;
+  const double most = saturates_ ? 1.0 : kMostBehind;
+  return usual * std::min(gain(shortLength, wholeLength) /
+                              gain(kTuning.mostShortIterations, 4.0 * kTuning.mostShortIterations),
+                          most);
+}
+
 double EllipsoidSearch::aim() const { return *goal_.psnr + margin_.aim; }
 
 double EllipsoidSearch::capped(double count) const {
@@ -378,7 +393,7 @@ double EllipsoidSearch::capped(double count) const {
 
 /// The number of ellipsoids with which a whole fit should reach a PSNR.
 double EllipsoidSearch::forecastCount(double psnr) const {
-  const double count = countFor(*draft_, psnr - behind_, slope_);
+  const double count = countFor(*draft_, psnr - behind(), slope_);
   return std::clamp(count, countOf(*draft_) / kMaxGrowth, countOf(*draft_) * kMaxGrowth);
 }
 
@@ -441,21 +456,19 @@ void EllipsoidSearch::decideSigns() {
 void EllipsoidSearch::forecast() {
   if (draft_->cancelled() || !compact_) return;
   const bool isQuick = goal_.psnr.has_value();
-  const CompactResult compact = compacted(*draft_, {.loss = rounding_.usualLoss, .quick = isQuick});
+  const CompactResult compact =
+      compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
   price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
   const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
   besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
   const double bytes =
-      goal_.psnr ? price_ * countFor(*draft_, aim() - behind_, slope_) : double(*goal_.bytes);
+      goal_.psnr ? price_ * countFor(*draft_, aim() - behind(), slope_) : double(*goal_.bytes);
   const double share = std::min(1.0, bytes / kTuning.bytesOfWholeFit);
   plan_.wholeIterations = std::max(std::min(plan_.shortIterations, plan_.wholeIterations),
                                    std::uint32_t(share * plan_.wholeIterations));
-  // A whole fit of less than four times the iterations gains less.
-  const double longer = double(plan_.wholeIterations) / double(plan_.shortIterations);
-  behind_ *= std::clamp(0.5 * std::log2(longer), 0.0, 1.0);
   if (goal_.psnr)
     expectedBytes_ =
-        std::uint64_t(double(besides_) + price_ * countFor(*draft_, aim() - behind_, slope_));
+        std::uint64_t(double(besides_) + price_ * countFor(*draft_, aim() - behind(), slope_));
 }
 
 void EllipsoidSearch::draft(const CancelToken* cancel) {
@@ -471,7 +484,7 @@ void EllipsoidSearch::draft(const CancelToken* cancel) {
 }
 
 double EllipsoidSearch::expectedPsnr() const {
-  return draft_->psnr + (draft_->cancelled() ? 0.0 : behind_) -
+  return draft_->psnr + (draft_->cancelled() ? 0.0 : behind()) -
          rounding_.usualLoss * rounding_.factor;
 }
 
@@ -482,7 +495,7 @@ bool EllipsoidSearch::mayReach(double psnr) const {
 bool EllipsoidSearch::mayStayBelow(std::uint64_t bytes) const {
   if (draft_->cancelled()) return true;
   const double slope = expectedBytes_ > 0 ? slope_ : kTuning.steepestDbPerDoubling;
-  const double count = countFor(*draft_, aim() - behind_ - kTuning.uncertainty, slope);
+  const double count = countFor(*draft_, aim() - behind() - kTuning.uncertainty, slope);
   return count <= double(maxCount_) && double(besides_) + price_ * count <= double(bytes);
 }
 
@@ -586,7 +599,8 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
     const bool isLast = attempt->cancelled() || (isSmall && isGood) || attempt->asked == 1;
     if (!isLast)
       each = std::max(
-          double(compacted(*attempt, {.loss = rounding_.usualLoss}).bytes) / countOf(*attempt),
+          double(compacted(*attempt, {.loss = rounding_.usualLoss, .layerErrors = false}).bytes) /
+              countOf(*attempt),
           kMoreEach * each);
     attempts_.assign(1, *attempt);  // the next fit may continue it
     if (isSmall) {

@@ -104,6 +104,7 @@ class EllipsoidSearch {
   void decideSigns();
   void forecast();
 
+  [[nodiscard]] double behind() const;
   [[nodiscard]] double aim() const;
   [[nodiscard]] double capped(double count) const;
   [[nodiscard]] double forecastCount(double psnr) const;
@@ -119,7 +120,6 @@ class EllipsoidSearch {
   bool compact_, saturates_;
   Rounding rounding_;
   Margin margin_;
-  double behind_;  ///< quality of a whole fit less that of a short one, dB
   double slope_ = kDbPerDoubling;
   std::uint64_t maxCount_;
   Decision bothSigns_;

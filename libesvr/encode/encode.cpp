@@ -590,7 +590,7 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options, Tone
   conversion.smallerExactBytes =
       unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
   if (tone.isOn()) setTone(given, tone, conversion.grid);
-  measureLayers(given, conversion.grid);
+  if (conversion.fit.end != FitEnd::kCancelled) measureLayers(given, conversion.grid);
   conversion.byPictures = judge.seesPictures();
   conversion.grid = throughTheFormat(std::move(conversion.grid), previous, memoryOf(given.source));
   return conversion;

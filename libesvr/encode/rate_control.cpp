@@ -469,14 +469,15 @@ CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
   // The trials know no mask, and no voxels outside the active box that become the background.
   const bool sameRule = grid.topology != TopologyKind::kMask && common(box, grid.activeBox) == box;
   result.grid.layerErrors.clear();
-  if (!options.quick && sameRule) result.grid.layerErrors = trials.layerErrors(best);
+  if (options.layerErrors && !options.quick && sameRule)
+    result.grid.layerErrors = trials.layerErrors(best);
   result.grid.field = std::move(best.field);
   result.grid.quantised = std::move(best.quantised);
   result.steps = best.steps;
   result.bytes = best.bytes;
   result.loss = trials.error() > 0.0 ? 10.0 * std::log10(best.error / trials.error()) : 0.0;
   if (options.quick) return result;
-  if (!sameRule)
+  if (options.layerErrors && !sameRule)
     result.grid.layerErrors =
         decodedLayerErrors(result.grid, source, {.box = box, .peak = options.peak});
   if (missedByReader(result.grid, source, options)) {

@@ -80,26 +80,17 @@ double Judge::forTones(SparseVolume volume) const {
 
 // ---- The total mass
 
-/// The mass of the values of tones that are multiplied by a factor.
+// A reader may round the values to halfs, which changes sums of many of them by much less than what is kept here.
 double Judge::massOf(const SparseVolume& tones, double factor) const {
   std::vector<double> parts(tones.brickCount());
-  SparseVolume values;
-  if (halfs_) {
-    values = tones;
-    for (float& tone : values.values) tone = float(tone * factor);
-    toValues(values);
-  }
   parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
-    if (halfs_)
-      for (const float value : values.brickValues(b)) parts[b] += value;
-    else
-      for (const float u : tones.brickValues(b))
-        parts[b] += std::clamp(tone_.value(float(u * factor)), range_.min, range_.max);
+    for (const float u : tones.brickValues(b))
+      parts[b] += std::clamp(tone_.value(float(u * factor)), range_.min, range_.max);
   });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
 
-double Judge::massFactor(const SparseVolume& reference, const SparseVolume& decoded) const {
+double Judge::massFactor(double wanted, const SparseVolume& decoded) const {
   // The derivative of the mass by the factor: that of a value is u dv/du = u cosh(u / s).
   std::vector<double> parts(decoded.brickCount());
   const double s = tone_.scale;
@@ -112,7 +103,6 @@ double Judge::massFactor(const SparseVolume& reference, const SparseVolume& deco
   // factor farther from 1 would change what is seen more than the missing mass does.
   constexpr int kSteps = 3;
   constexpr double kMostChange = 0.05, kEnough = 1e-5;
-  const double wanted = massOf(reference, 1.0);
   double factor = 1.0;
   for (int n = 0; n < kSteps; ++n) {
     const double change = (wanted - massOf(decoded, factor)) / growth;
@@ -129,9 +119,10 @@ double keepMass(const Job& job, StoredGrid& grid) {
   // Decoded sums are clamped to the range of the source, so that a factor far from 1 is found in two steps.
   constexpr int kMostSteps = 2;
   constexpr double kFar = 0.005;
+  const double wanted = job.judge->massOf(job.input.source);
   for (int step = 1;; ++step) {
     SparseVolume tones = decoded();
-    const double factor = job.judge->massFactor(job.input.source, tones);
+    const double factor = job.judge->massFactor(wanted, tones);
     for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
       grid.quantised[c].lattice.intensityStep *= factor;
       grid.field.chunks[c].ellipsoids = dequantise(grid.quantised[c]);
@@ -202,7 +193,7 @@ ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options) {
     return previous->tone;
   if (!Judge::seesPictures(input, options)) return {};
   const ToneCurve likely = likelyTone(input.source);
-  if (!likely.isOn()) return {};
+  if (!likely.isOn() || options.effort == kLeastEffort) return likely;
   const auto gain = unlessCancelled([&] {
     return std::optional(qualityWith(likely, input, options) - qualityWith({}, input, options));
   });
@@ -221,7 +212,8 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
 void measureLayers(const ConvertInput& input, StoredGrid& grid) {
   const BestSoFar completion;  // a grid that is there is not given up
   std::vector<LayerError> errors;
-  for (std::size_t layers = 1; layers <= grid.layerErrors.size(); ++layers) {
+  const std::size_t all = layerCount(grid);
+  for (std::size_t layers = 1; layers <= all && all > 1; ++layers) {
     const VolumeMetrics m = compareVolumes(
         input.source, decodeGrid(firstLayers(grid, layers), {.memory = memoryOf(input.source)}));
     errors.push_back({float(m.psnrBox), float(m.maxError)});
@@ -233,21 +225,14 @@ void measureLayers(const ConvertInput& input, StoredGrid& grid) {
 
 namespace {
 
-struct Magnitudes {
-  double least = std::numeric_limits<double>::infinity();        ///< magnitude of an active value
-  double leastAbove0 = std::numeric_limits<double>::infinity();  ///< infinite if all are 0
-};
-
-Magnitudes magnitudesOf(const SparseVolume& volume) {
-  Magnitudes found;
+/// The smallest magnitude of an active value.
+double leastOf(const SparseVolume& volume) {
+  double least = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (!volume.active[b].test(v)) continue;
-      const double magnitude = std::abs(double(volume.brickValues(b)[std::size_t(v)]));
-      found.least = std::min(found.least, magnitude);
-      if (magnitude > 0.0) found.leastAbove0 = std::min(found.leastAbove0, magnitude);
-    }
-  return found;
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (volume.active[b].test(v))
+        least = std::min(least, std::abs(double(volume.brickValues(b)[std::size_t(v)])));
+  return least;
 }
 
 /// The shares within which the values of a lattice should be, so that they keep to a bound after they are rounded
@@ -264,22 +249,6 @@ std::vector<double> sharesBeforeRounding(double share, double floor, DecodedValu
   return {before, share - 0x1p-10};
 }
 
-/// A voxel that is not within a bound relative to its value.
-std::optional<Coord> beyondRelativeBound(const SparseVolume& source, const SparseVolume& decoded,
-                                         double share, double floor) {
-  for (std::size_t b = 0; b < source.brickCount(); ++b) {
-    const auto other = findBrick(decoded, brickOf(source.brickCorner(b) - decoded.origin));
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const double value = source.brickValues(b)[std::size_t(v)];
-      const double made = other ? decoded.brickValues(*other)[std::size_t(v)] : decoded.background;
-      if (made == value || std::abs(made - value) <= share * std::max(std::abs(value), floor))
-        continue;
-      return source.brickCorner(b) + voxelLocal(v);
-    }
-  }
-  return std::nullopt;
-}
-
 /// What a reader gets from a layer of tones. \param range  of the source's active values
 SparseVolume decodedTones(const VoxelLayer& layer, ToneCurve tone, const ValueRange& range,
                           DecodedValues decoded) {
@@ -293,11 +262,11 @@ SparseVolume decodedTones(const VoxelLayer& layer, ToneCurve tone, const ValueRa
 
 RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal) {
   const SparseVolume& source = job.input.source;
-  const Magnitudes magnitudes = magnitudesOf(source);
-  if (!std::isfinite(magnitudes.leastAbove0)) return {exactLayer(source), {}};
-  double floor = goal.floor.value_or(magnitudes.leastAbove0);
+  const double least = leastMagnitude(source);
+  if (!std::isfinite(least)) return {exactLayer(source), {}};
+  double floor = goal.floor.value_or(least);
   if (source.background != 0.0f)
-    return {boundedLayer(source, goal.share * std::max(floor, magnitudes.least), voxelActivity(job),
+    return {boundedLayer(source, goal.share * std::max(floor, leastOf(source)), voxelActivity(job),
                          voxelSigns(job), decodedValues(job)),
             {}};
   // Frames of a sequence are predicted from each other where they have one curve.
@@ -321,18 +290,18 @@ RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal) {
     VoxelLayer layer = boundedLayer(tones, halfStep, voxelActivity(job), voxelSigns(job));
     if (layer.form != VoxelForm::kQuantised) break;
     const auto decoded = decodedTones(layer, tone, values, decodedValues(job));
-    if (!beyondRelativeBound(source, decoded, goal.share, floor)) return {std::move(layer), tone};
+    if (largestRelativeError(source, decoded, floor).share <= goal.share)
+      return {std::move(layer), tone};
   }
   return {exactLayer(source), {}};
 }
 
 void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded,
                           const RelativeBoundGoal& goal) {
-  const double floor = goal.floor.value_or(magnitudesOf(input.source).leastAbove0);
-  const auto beyond = beyondRelativeBound(input.source, decoded, goal.share, floor);
-  if (beyond)
+  const RelativeError largest = largestRelativeError(input.source, decoded, goal.floor);
+  if (largest.share > goal.share)
     throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': the error at " +
-                         toString(*beyond) + " exceeds the bound relative to the value there");
+                         toString(largest.at) + " exceeds the bound relative to the value there");
 }
 
 }  // namespace esvr::encode

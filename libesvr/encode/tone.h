@@ -29,16 +29,17 @@ class Judge {
   /// better for thin and for dense smoke.
   [[nodiscard]] double forTones(SparseVolume volume) const;
 
-  /// The factor of decoded tones with which the total mass of their values is that of a reference.
-  /// \param reference  tones of the source, or of a sample of it
-  [[nodiscard]] double massFactor(const SparseVolume& reference, const SparseVolume& decoded) const;
+  /// The total mass of the values of tones that are multiplied by a factor.
+  [[nodiscard]] double massOf(const SparseVolume& tones, double factor = 1.0) const;
+
+  /// The factor of decoded tones with which their mass is the wanted one: that of the source, or of a sample of it.
+  [[nodiscard]] double massFactor(double wanted, const SparseVolume& decoded) const;
 
   [[nodiscard]] const SparseVolume& values() const { return values_; }
   [[nodiscard]] ToneCurve tone() const { return tone_; }
 
  private:
   void toValues(SparseVolume& volume) const;
-  [[nodiscard]] double massOf(const SparseVolume& tones, double factor) const;
 
   const SparseVolume& values_;
   ToneCurve tone_;
@@ -79,7 +80,7 @@ void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded
 /// Makes a grid of tones, which was converted like one of values, a grid of values.
 void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid);
 
-/// Measures the errors of the layers of a grid again, which were those of its tones or from before keepMass().
+/// Measures the errors of the layers of a judged grid, if it has more than one.
 void measureLayers(const ConvertInput& input, StoredGrid& grid);
 
 }  // namespace esvr::encode

@@ -179,14 +179,21 @@ Candidate estimateExactVoxels(const Job& job) {
   return {bytes, std::numeric_limits<double>::infinity(), isSampled, seconds};
 }
 
+namespace {
+
+VoxelCandidate exactCandidate(const Job& job, VoxelLayer exact) {
+  VoxelCandidate made;
+  made.grid = makeStoredVoxels(job.input.descriptor, valuesOf(job), std::move(exact));
+  made.bytes = bytesInFrame(made.grid, job.options.previous);
+  made.psnr = std::numeric_limits<double>::infinity();
+  return made;
+}
+
+}  // namespace
+
 VoxelCandidate exactVoxels(const Job& job) {
   VoxelCandidate made;
-  made.seconds = secondsOf([&] {
-    const SparseVolume& source = valuesOf(job);
-    made.grid = makeStoredVoxels(job.input.descriptor, source, exactLayer(source));
-    made.bytes = bytesInFrame(made.grid, job.options.previous);
-    made.psnr = std::numeric_limits<double>::infinity();
-  });
+  made.seconds = secondsOf([&] { made = exactCandidate(job, exactLayer(valuesOf(job))); });
   return made;
 }
 
@@ -202,9 +209,9 @@ std::optional<VoxelCandidate> smallerExactVoxels(const Job& job, const StoredGri
       bits += std::log2(1.0 + std::abs(double(codes[v]) - codes[v - 1]));
     active += double(layer.active[b].count());
   }
-  const VoxelForm form = exactLayer(valuesOf(job)).form;
-  if (bits / active < leastBitsOfExact(form) - kBetterPrediction) return std::nullopt;
-  VoxelCandidate exact = exactVoxels(job);
+  VoxelLayer exactCodes = exactLayer(valuesOf(job));
+  if (bits / active < leastBitsOfExact(exactCodes.form) - kBetterPrediction) return std::nullopt;
+  VoxelCandidate exact = exactCandidate(job, std::move(exactCodes));
   if (exact.bytes > bytesInFrame(quantised, job.options.previous)) return std::nullopt;
   return exact;
 }
@@ -223,6 +230,9 @@ VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
       besides_(bytesBeside(job)) {
   decision_.seconds = secondsOf([&] { plateau_ = plateauOf(tryOn_); });
   seconds_ += *decision_.seconds;
+  if (!seesPictures(job)) return;
+  mass_ = job.judge->massOf(job.input.source);
+  sampleMass_ = job.judge->massOf(sample_);
 }
 
 double VoxelSearch::price() const {
@@ -253,7 +263,8 @@ VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setti
   ThriftyLayer thrifty = thriftyLayer(volume, std::move(layer), thrift);
   if (tooMany && thrifty.tooMany) *tooMany = *thrifty.tooMany;
   if (seesPictures(job_) && !thrifty.tooMany)
-    thrifty.layer.divisor /= job_.judge->massFactor(volume, volumeOf(thrifty.layer));
+    thrifty.layer.divisor /=
+        job_.judge->massFactor(&volume == &sample_ ? sampleMass_ : mass_, volumeOf(thrifty.layer));
   return std::move(thrifty.layer);
 }
 

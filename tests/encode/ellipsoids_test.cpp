@@ -129,20 +129,28 @@ TEST(EllipsoidSearch, SaysWhatASizeThatIsTooSmallNeeds) {
 TEST(Plan, GivesLessTimeToLargeVolumesOfACpuAndToLittleEffort) {
   const SparseVolume volume = test::noiseVolume(2);
   const GridDescriptor descriptor;
-  const ConvertInput input{descriptor, volume};
   ConvertOptions options;
+  const auto planFor = [&](const SparseVolume& source, int effort) {
+    options.effort = effort;
+    return encode::planOf({{descriptor, source}, options});
+  };
+  EXPECT_FALSE(planFor(volume, kLeastEffort).fitsInTime);
   std::uint32_t before = 0;
-  for (options.effort = kLeastEffort; options.effort <= kMostEffort; ++options.effort) {
-    const encode::Plan plan = encode::planOf({input, options});
+  for (int effort = kLeastEffort + 1; effort <= kUsualEffort; ++effort) {
+    const encode::Plan plan = planFor(volume, effort);
     EXPECT_GT(plan.wholeIterations, before);
     EXPECT_LE(plan.shortIterations, plan.wholeIterations);
     EXPECT_TRUE(plan.fitsInTime);
     before = plan.wholeIterations;
   }
+  EXPECT_EQ(planFor(volume, kMostEffort).wholeIterations, before) << "longer fits gain nothing";
   SparseVolume large;  // the plan looks at the number of bricks alone
+  large.bricks.resize(10'000);
+  EXPECT_GT(planFor(large, kUsualEffort + 1).wholeIterations,
+            planFor(large, kUsualEffort).wholeIterations);
+  EXPECT_LE(planFor(large, kMostEffort).wholeIterations, before);
   large.bricks.resize(200'000);
-  options.effort = kUsualEffort;
-  EXPECT_FALSE(encode::planOf({{descriptor, large}, options}).fitsInTime);
+  EXPECT_FALSE(planFor(large, kUsualEffort).fitsInTime);
 }
 
 // ---- Signs

@@ -128,11 +128,11 @@ inline constexpr int kUsualEffort = 5, kLeastEffort = 1, kMostEffort = 9;
 
 struct ConvertOptions {
   Goal goal;
-  /// How long a conversion may take, from kLeastEffort to kMostEffort. A step below kUsualEffort halves
-  /// the iterations of fits; a step above it makes them half as long again, and allows a third fit.
-  /// On the CPU, the fits of large volumes have fewer iterations (esvr-sample plume --resolution 400,
-  /// 4 million active voxels: 11 s on two cores). Where too few iterations remain, only voxels are
-  /// stored (Conversion::fitsTookTooLong).
+  /// How long a conversion may take, from kLeastEffort to kMostEffort. The least one makes no fits, so that voxels are
+  /// stored unless ellipsoids are wanted. A step below kUsualEffort halves the iterations of fits. On the CPU, the
+  /// fits of large volumes have fewer iterations than those of small ones, and none where too few remain
+  /// (Conversion::fitsTookTooLong); a step above kUsualEffort makes these half as long again, up to those of small
+  /// volumes. A FitGoal has as many iterations more or fewer.
   int effort = kUsualEffort;
   Representation representation = Representation::kAuto;
   Measure measure = Measure::kAuto;
@@ -296,6 +296,7 @@ struct CompactOptions {
   std::optional<Box> box{};      ///< box of the PSNR; default: the active bounding box
   std::optional<double> peak{};  ///< peak of the PSNR, above 0; default: peakOf() of the source
   Device device{};               ///< device that evaluates the trials
+  bool layerErrors = true;       ///< whether the errors of the layers are measured
   /// The result is made in about the time of three evaluations of the grid: the steps are those with
   /// which a search would begin, or, for `bytes`, the first that fit; the intensities are rounded but
   /// not solved for, and there are no errors of layers. It serves for
