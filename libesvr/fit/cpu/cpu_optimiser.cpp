@@ -21,8 +21,8 @@ std::unique_ptr<Optimiser> makeOptimiser(const FitTarget& target, const Optimise
 
 void adamStep(std::span<Ellipsoid> ellipsoids, std::span<AdamState> states,
               std::span<const EllipsoidGradient> gradients, const AdamStep& step) {
-  using Range = tbb::blocked_range<std::size_t>;
-  parallelFor(Range(0, ellipsoids.size(), 64), [&](const Range& range) {
+  const tbb::blocked_range<std::size_t> all(0, ellipsoids.size(), 64);
+  parallelFor(all, [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       Ellipsoid& p = ellipsoids[i];
       const ParameterVector largest = largestStep(p, step.sizes);
