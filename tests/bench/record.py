@@ -189,8 +189,9 @@ class Case:
                                            "--report", report, "--force", "--quiet"], runs=1)
         grids = json.loads(report.read_text())["grids"]
         # JSON has no infinity; a grid that is exact has null.
-        return {g["name"]: {"psnr_box": g["psnr_box"], "psnr_active": g["psnr_active"], "max_error": g["max_error"],
-                            "iou": g["iou"]} for g in grids}
+        # A grid that is not looked through has no transmittance.
+        kept = ["psnr_box", "psnr_active", "psnr_t50", "max_error", "iou"]
+        return {g["name"]: {name: g[name] for name in kept if name in g} for g in grids}
 
     def on_cpu(self):
         file, back = self.file("cpu"), self.folder / f"{self.stem}.vdb"
@@ -316,6 +317,7 @@ COLUMNS = [
     ("bytes", "cpu", "bytes", lambda v: f"{v:,.0f}", ("more", BYTES)),
     ("PSNR box", "cpu", "psnr_box", lambda v: f"{v:.2f}", ("dB", DB)),
     ("PSNR active", "cpu", "psnr_active", lambda v: f"{v:.2f}", ("dB", DB)),
+    ("T 0.5", "cpu", "psnr_t50", lambda v: f"{v:.2f}", ("dB", DB)),
     ("CPU s", "cpu", "user_seconds", lambda v: f"{v:.2f}", ("time", TIME)),
     ("memory MB", "cpu", "memory", lambda v: f"{v / 1e6:.0f}", None),
     ("decoding s", "cpu", "decode_seconds", lambda v: f"{v:.2f}", ("time", TIME)),
@@ -341,7 +343,7 @@ def figure(case, part, name):
         return None
     if name.startswith("psnr"):
         grid = main_grid(figures)
-        return math.inf if grid and grid[name] is None else grid.get(name)
+        return math.inf if name in grid and grid[name] is None else grid.get(name)
     if name.endswith("picture_psnr") and name in figures:
         return math.inf if figures[name] is None else figures[name]  # pictures of the same voxels
     return figures.get(name)
@@ -426,7 +428,8 @@ python3 tests/bench/record.py compare docs/figures/record.json new.json
 Measured on {where['date']}, on two cores ({where['cpu']}) for each conversion, and on {gpu}.
 
 - **bytes, PSNR**: of the file that `vdb2esvr --device cpu --threads 2` writes, measured by `esvr-compare check` over the
-  bounding box of the active voxels and over the active voxels. A file of several grids shows its density.
+  bounding box of the active voxels, over the active voxels and, of grids that are looked through, of the transmittance
+  ([compare.md](../compare.md#the-psnr-of-transmittance)). A file of several grids shows its density.
 - **CPU s, memory**: user seconds and the largest resident memory of that process. **decoding s**: seconds of `esvr2vdb`.
 - **GPU s, GPU bytes, GPU PSNR box**: seconds of the whole process with `--device cuda`, and what it writes.
 - `plume_256` is `esvr-sample plume --resolution 256`; gas_0004 has 24 grids, of which `--count 12000` takes the density.

@@ -11,8 +11,8 @@ from contextlib import redirect_stdout
 import record
 
 CASE = {"cpu": {"bytes": 10000, "user_seconds": 10.0, "seconds": 6.0, "memory": 5e7, "decode_seconds": 1.0,
-                "missed": False, "grids": {"density": {"psnr_box": 50.0, "psnr_active": 40.0}}},
-        "gpu": {"bytes": 10000, "seconds": 2.0, "grids": {"density": {"psnr_box": 50.0, "psnr_active": 40.0}}},
+                "missed": False, "grids": {"density": {"psnr_box": 50.0, "psnr_active": 40.0, "psnr_t50": 35.0}}},
+        "gpu": {"bytes": 10000, "seconds": 2.0, "grids": {"density": {"psnr_box": 50.0, "psnr_active": 40.0, "psnr_t50": 35.0}}},
         "drawn": {"fps": 1000.0, "nanovdb_fps": 500.0, "picture_psnr": 60.0, "device_bytes": 2e7,
                   "nanovdb_device_bytes": 1e7}}
 
@@ -80,7 +80,7 @@ class Page(unittest.TestCase):
             record.page(types.SimpleNamespace(record=folder / "new.json", before=folder / "old.json",
                                               page=folder / "page.md"))
             text = (folder / "page.md").read_text()
-        self.assertIn("| smoke1 | default | 20,000 (+100.0 %) **worse** | 50.00 | 40.00 | 10.00 | 50 | 1.00 | 2.00 |", text)
+        self.assertIn("| smoke1 | default | 20,000 (+100.0 %) **worse** | 50.00 | 40.00 | 35.00 | 10.00 | 50 | 1.00 | 2.00 |", text)
         self.assertIn("| smoke1 | default | 500 | 1000 | 60.00 |", text)
 
 
