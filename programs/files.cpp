@@ -81,15 +81,17 @@ std::uint64_t mostBytes(const fs::path& folder) {
   return std::uint64_t(disk.f_bavail) * disk.f_frsize / 2;
 }
 
-/// A new link in the folder to an open file.
-fs::path linkTo(int fd, const fs::path& folder, std::string_view extension) {
+/// A new link in the folder to an open file. Messages show its path, so that it says what it is a copy of.
+fs::path linkTo(int fd, const fs::path& folder, const std::string& input,
+                std::string_view extension) {
+  const std::string from = input == kStandardInput ? "standard-input" : "pipe";
   const std::string target = "/proc/" + std::to_string(::getpid()) + "/fd/" + std::to_string(fd);
   std::random_device random;
   for (;;) {
     std::array<char, 9> digits{};
     std::snprintf(digits.data(), digits.size(), "%08x", unsigned(random()));
     const fs::path path =
-        folder / ("esvr-piped-" + std::string(digits.data()) + std::string(extension));
+        folder / ("esvr-" + from + "-" + std::string(digits.data()) + std::string(extension));
     if (::symlink(target.c_str(), path.c_str()) == 0) return path;
     if (errno != EEXIST) failAt("cannot write ", path, errno);
   }
@@ -125,7 +127,7 @@ PipedInput::PipedInput(const std::string& input, const fs::path& folder) {
                              " has; --scratch names another folder");
       writeAll(fd_, std::span(block).first(n), folder);
     }
-    path_ = linkTo(fd_, folder, extension);
+    path_ = linkTo(fd_, folder, input, extension);
   } catch (...) {
     ::close(fd_);
     throw;

@@ -426,6 +426,10 @@ TEST_F(Vdb2Esvr, leavesNoCopyOfAPipeAndRefusesOtherBytes) {
   EXPECT_EQ(endless.exitCode, 3);
   EXPECT_THAT(endless.err, HasSubstr("standard input is neither"));
   EXPECT_EQ(test::vdb2esvr({"-", folder_ / "x.esvr"}).exitCode, 3) << "an empty input";
+  const auto cut = test::runProgram(
+      "/bin/sh", {"-c", "head -c 300 " + in() + " | " + tmp + quickly("-", folder_ / "x.esvr")});
+  EXPECT_EQ(cut.exitCode, 3);
+  EXPECT_THAT(cut.err, HasSubstr("esvr-standard-input-"));
 }
 
 TEST_F(Vdb2Esvr, fitsNoMixtureOfAFileThatIsReplacedWhileItIsReadSlow) {
