@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <set>
-#include <unordered_map>
 #include <utility>
 
+#include "esvr/convert_file.h"
 #include "esvr/error.h"
 #include "programs/messages.h"
 
@@ -42,13 +42,8 @@ WantedPlaces wantedPlaces(const std::filesystem::path& file, const VdbSummary& s
 }
 
 /// The reason why a grid is not fitted; empty if it is.
-std::string whyCarried(const GridSummary& grid, bool isKept, bool lossless) {
-  if (isKept) return "--keep names it";
-  if (!grid.skipReason.empty() && !grid.isVector) return grid.skipReason;
-  const bool isDouble = grid.valueType == "double" || grid.valueType == "vec3d";
-  return lossless && isDouble && grid.whyNotCarried.empty()
-             ? "its values are doubles, which a lossless file cannot hold in another way"
-             : "";
+std::string whyNotFitted(const GridSummary& grid, bool isKept, bool lossless) {
+  return isKept ? "--keep names it" : whyCarried(grid, lossless);
 }
 
 void addFitted(const GridSummary& grid, std::size_t place, const GridNames& names,
@@ -56,11 +51,6 @@ void addFitted(const GridSummary& grid, std::size_t place, const GridNames& name
   if (!grid.isVector) return fitted.push_back({grid, place, std::nullopt, names.unique(place)});
   for (std::size_t c = 0; c < kComponents; ++c)
     fitted.push_back({grid, place, c, names.ofComponent(place, c)});
-}
-
-void numberThoseOfOneName(std::vector<FittedGrid>& fitted) {
-  std::unordered_map<std::string, std::size_t> counts;
-  for (FittedGrid& grid : fitted) grid.number = counts[grid.storedName()]++;
 }
 
 void refuseLostGrids(const std::filesystem::path& file, const std::vector<NotFitted>& carried) {
@@ -84,10 +74,6 @@ void refuseNothing(const std::filesystem::path& file, const VdbSummary& summary,
 
 }  // namespace
 
-std::string FittedGrid::storedName() const {
-  return component ? componentName(source.name, *component) : source.name;
-}
-
 GridNames namesOf(const VdbSummary& file) {
   std::vector<std::string> names;
   for (const GridSummary& grid : file.grids) names.push_back(grid.name);
@@ -101,7 +87,7 @@ GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summ
   GridChoice choice;
   for (std::size_t i = 0; i < summary.grids.size(); ++i) {
     const GridSummary& grid = summary.grids[i];
-    const std::string why = whyCarried(grid, places.keep.contains(i), wanted.lossless);
+    const std::string why = whyNotFitted(grid, places.keep.contains(i), wanted.lossless);
     if (places.skip.contains(i))
       choice.skipped.push_back({grid, i, "--skip names it"});
     else if (places.wants(i) && why.empty())
@@ -109,7 +95,6 @@ GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summ
     else if (places.wants(i))
       choice.carried.push_back({grid, i, why});
   }
-  numberThoseOfOneName(choice.fitted);
   refuseLostGrids(file, choice.carried);
   refuseNothing(file, summary, choice);
   return choice;

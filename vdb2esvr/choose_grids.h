@@ -32,15 +32,7 @@ struct FittedGrid {
   GridSummary source;                      ///< the grid of the input
   std::size_t place = 0;                   ///< its index in VdbSummary::grids
   std::optional<std::size_t> component{};  ///< of vectors
-  std::string uniqueName;        ///< of the grid or the component, by GridNames of the input
-  std::size_t number = 0;        ///< of the fitted grids before it that are stored by the same name
-  std::optional<double> peak{};  ///< peak of the PSNR of vectors (findScales)
-  std::optional<double> range{};  ///< of vectors, to which a bound in % refers (findScales)
-
-  /// The grid or the component, which tells it from all others of the input.
-  [[nodiscard]] NamedGrid id() const { return {place, component}; }
-  /// The name by which it is stored: GridSummary::name, or componentName() of it.
-  [[nodiscard]] std::string storedName() const;
+  std::string uniqueName;  ///< of the grid or the component, by GridNames of the input
 };
 
 struct GridChoice {

@@ -1,4 +1,4 @@
-// Reads, converts and measures grids of the input.
+// Reads grids of the input, and measures their conversions.
 #include "vdb2esvr/convert.h"
 
 #include <algorithm>
@@ -34,23 +34,15 @@ void carry(const FittedGrid& grid, const std::string& why, GridChoice& choice) {
 
 }  // namespace
 
-VolumeGrid readSource(const Options& options, const FittedGrid& grid) {
-  return grid.component ? readComponent(options.input, grid.place, *grid.component, options.read)
-                        : readGrid(options.input, grid.place, options.read);
-}
-
-void findScales(const Options& options, std::vector<FittedGrid>& grids) {
-  for (std::size_t g = 0; g < grids.size(); ++g) {
-    if (!grids[g].component) continue;
-    if (grids[g].component != std::size_t{0}) {
-      grids[g].peak = grids[g - 1].peak, grids[g].range = grids[g - 1].range;
-      continue;
-    }
-    const VectorGrid vectors = sayingTheWayOut(
-        grids[g], [&] { return readVector(options.input, grids[g].place, options.read); });
-    grids[g].peak = peakOfVectors(vectors.components);
-    grids[g].range = valueRangeOfVectors(vectors.components);
-  }
+FileSource sourceOf(const Options& options, const VdbSummary& input, const GridChoice& choice) {
+  FileChoice places;
+  for (const FittedGrid& grid : choice.fitted)
+    if (grid.component.value_or(0) == 0) places.converted.push_back(grid.place);
+  for (const NotFitted& grid : choice.carried) places.carried.push_back(grid.place);
+  FileSource source = readSources(options.input, input, places, options.read);
+  for (std::size_t g = 0; g < choice.fitted.size(); ++g)
+    source.grids[g].goal = ownGoalOf(options, choice.fitted[g]);
+  return source;
 }
 
 void carryInactiveValues(const Options& options, const std::function<void(std::string)>& warn,
@@ -76,69 +68,9 @@ std::string wayOut(const GridSummary& grid) {
   return " --skip " + name + " leaves the grid out";
 }
 
-// Converting.
-
-const StoredGrid* previousOf(const Options& options, const FittedGrid& fitted) {
-  if (!options.previous) return nullptr;
-  const std::string name = fitted.storedName();
-  std::size_t before = 0;
-  for (const StoredGrid& grid : options.previous->grids)
-    if (grid.descriptor.name == name && before++ == fitted.number) return &grid;
-  return nullptr;
-}
-
-SourceKey sourceKeyOf(const Options& options, const FittedGrid& fitted, const VolumeGrid& source) {
-  return {keyOf({source.descriptor, source.volume}), fitted.peak, fitted.range,
-          ownGoalOf(options, fitted)};
-}
+// Measuring.
 
 namespace {
-
-/// The same grid of the previous frame, if it was made from the same source.
-const StoredGrid* asBefore(const Options& options, const FittedGrid& fitted,
-                           const VolumeGrid& source, const SourceKey& key) {
-  const StoredGrid* const before = previousOf(options, fitted);
-  const auto keyBefore = options.previousSources->find(fitted.uniqueName);
-  const bool isSame = before != nullptr && keyBefore != options.previousSources->end() &&
-                      keyBefore->second == key &&
-                      before->descriptor.valueType == source.descriptor.valueType;
-  return isSame ? before : nullptr;
-}
-
-void convertByPaper(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
-  const ConvertOptions& convert = options.convert;
-  PaperConversion made = esvr::convertByPaper({source.descriptor, source.volume},
-                                              {convert.fit, *options.paper}, convert.storage);
-  grid.conversion = std::move(made.conversion);
-  grid.paper = std::move(made.record);
-}
-
-/// The goal of a grid. A bound in % of the range of vectors is the same for all components.
-Goal resolvedGoal(const Options& options, const FittedGrid& fitted) {
-  Goal goal = goalOf(options, fitted);
-  if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && fitted.range)
-    *within = {within->bound * *fitted.range, false};
-  return goal;
-}
-
-/// What a grid is converted to.
-struct Wish {
-  std::optional<std::uint64_t> bytes;  ///< that it may add
-  const StoredGrid* previous;          ///< ConvertOptions::previous
-};
-
-void convert(const Options& options, const VolumeGrid& source, const Wish& wish,
-             ConvertedGrid& grid) {
-  if (options.paper) return convertByPaper(options, source, grid);
-  ConvertOptions wanted = options.convert;
-  wanted.previous = wish.previous;
-  if (wish.bytes) wanted.goal = SizeGoal{*wish.bytes};
-  if (grid.id.component) wanted.measure = Measure::kValues;
-  // The parts of a single fit do not depend on the storage, and compact storage takes time.
-  if (options.onlyFits && std::holds_alternative<FitGoal>(wanted.goal))
-    wanted.storage.form = Storage::kFloat32;
-  grid.conversion = convertVolume({source.descriptor, source.volume}, wanted);
-}
 
 /// Largest number of voxels in bricks up to which the meshes of a level set are compared without
 /// being asked for. Comparing them takes about 2 s per million of these voxels.
@@ -152,15 +84,6 @@ std::optional<SurfaceErrors> surfaceErrors(const VolumeGrid& source, const Volum
   return errors;
 }
 
-/// A converted grid that has its names only.
-ConvertedGrid named(const FittedGrid& fitted) {
-  ConvertedGrid grid;
-  grid.uniqueName = fitted.uniqueName;
-  grid.sourceName = fitted.source.uniqueName;
-  grid.id = fitted.id();
-  return grid;
-}
-
 /// The errors that a summary needs.
 VolumeGrid measureValues(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
   const CommonFitOptions& fit = options.convert.fit;
@@ -169,7 +92,7 @@ VolumeGrid measureValues(const Options& options, const VolumeGrid& source, Conve
   const bool isLight =
       !grid.id.component && isLookedThrough(source.descriptor.gridClass, source.volume);
   grid.metrics = compareVolumes(source.volume, decoded.volume,
-                                {.box = fit.box, .peak = fit.peak, .transmittance = isLight});
+                                {.box = fit.box, .peak = grid.key.peak, .transmittance = isLight});
   return decoded;
 }
 
@@ -191,64 +114,33 @@ void measure(const Options& options, const VolumeGrid& source, ConvertedGrid& gr
   (void)measureValues(options, source, grid);
 }
 
-ConvertedGrid readAndConvert(const Options& given, const FittedGrid& fitted,
-                             std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
-  Options options = given;
-  options.convert.goal = resolvedGoal(given, fitted);
-  CommonFitOptions& fit = options.convert.fit;
-  fit.peak = fitted.peak;
-  ConvertedGrid grid = named(fitted);
-  grid.wantedPsnr = wantedPsnrOf(given, fitted);
-  cli::Stopwatch watch;
-  const VolumeGrid source = readSource(options, fitted);
-  grid.bricks = source.volume.brickCount();
-  grid.nonFiniteReplaced = source.nonFiniteReplaced;
-  grid.inactive = source.inactive;
-  grid.seconds.read = watch.lap();
+}  // namespace
 
-  grid.device = deviceName(fit.device);
-  const StoredGrid* before = nullptr;
-  if (options.previousSources != nullptr) {
-    grid.source = sourceKeyOf(options, fitted, source);
-    before = asBefore(options, fitted, source, *grid.source);
-  }
-  if (before != nullptr) {
-    grid.asBefore = true;
-    grid.conversion.grid = *before;
-    grid.conversion.grid.descriptor = source.descriptor;
-    grid.conversion.grid.reference.reset();  // it may name another grid of this file
-  } else {
-    convert(options, source, {bytes, expected ? expected : previousOf(options, fitted)}, grid);
-  }
-  grid.seconds.seed = grid.conversion.fit.secondsSeed;
-  grid.seconds.optimise = grid.conversion.fit.secondsOptimise;
-  grid.seconds.encode = watch.lap() - grid.seconds.fit();
+ConvertedGrid measured(const Options& options, const FittedGrid& fitted, const VolumeGrid& source,
+                       const GridConversion& made, const Device& device) {
+  ConvertedGrid grid;
+  static_cast<GridConversion&>(grid) = made;
+  grid.uniqueName = fitted.uniqueName;
+  grid.sourceName = fitted.source.uniqueName;
+  grid.id = {fitted.place, fitted.component};
+  grid.wantedPsnr = wantedPsnrOf(options, fitted);
+  grid.device = deviceName(device);
+  const FitResult& fit = made.conversion.fit;
+  grid.seconds = {made.secondsRead, fit.secondsSeed, fit.secondsOptimise, 0.0, 0.0};
+  grid.seconds.encode = made.secondsConvert - grid.seconds.fit();
   if (options.onlyFits) return grid;
-
+  cli::Stopwatch watch;
   measure(options, source, grid);
   grid.seconds.measure = watch.lap();
   return grid;
 }
 
-}  // namespace
-
-ConvertedGrid convertGrid(const Options& options, const FittedGrid& fitted,
-                          std::optional<std::uint64_t> bytes, const StoredGrid* expected) {
-  return sayingTheWayOut(fitted, [&] { return readAndConvert(options, fitted, bytes, expected); });
-}
-
-ConvertedGrid twinOf(const ConvertedGrid& grid, const FittedGrid& fitted, const Twin& twin) {
-  ConvertedGrid made = grid;
-  made.uniqueName = fitted.uniqueName;
-  made.sourceName = fitted.source.uniqueName;
-  made.id = fitted.id();
-  made.conversion.grid.descriptor = twin.descriptor;
-  made.nonFiniteReplaced = twin.nonFiniteReplaced;
-  made.twinOf = grid.id;
-  made.inactive = twin.inactive;
-  made.sameAs = grid.uniqueName;
-  made.seconds = {.read = twin.secondsRead};
-  return made;
+VectorMetrics measureVector(const Options& options, const EsvrFile& file,
+                            const StoredVector& vector, std::size_t place) {
+  const VectorGrid source = readVector(options.input, place, options.read);
+  const VectorGrid decoded =
+      decodeVector(vector.name, componentsOf(file, vector), {.memory = options.read.memory});
+  return compareVectors(source.components, decoded.components, {.box = options.convert.fit.box});
 }
 
 }  // namespace esvr::vdb2esvr

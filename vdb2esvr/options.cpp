@@ -96,20 +96,15 @@ void resolveNames(const VdbSummary& input, Options& options) {
   }
 }
 
-std::optional<std::size_t> ownGoalOf(const Options& options, const FittedGrid& grid) {
+std::optional<Goal> ownGoalOf(const Options& options, const FittedGrid& grid) {
   const auto own = std::ranges::find(options.gridGoals, grid.place, &GridGoal::place);
-  if (own == options.gridGoals.end()) return std::nullopt;
-  return std::size_t(own - options.gridGoals.begin());
-}
-
-const Goal& goalOf(const Options& options, const FittedGrid& grid) {
-  const auto own = ownGoalOf(options, grid);
-  return own ? options.gridGoals[*own].goal : options.convert.goal;
+  return own == options.gridGoals.end() ? std::nullopt : std::optional(own->goal);
 }
 
 std::optional<double> wantedPsnrOf(const Options& options, const FittedGrid& grid) {
-  if (!ownGoalOf(options, grid)) return options.psnr;
-  const auto* psnr = std::get_if<PsnrGoal>(&goalOf(options, grid));
+  const auto own = ownGoalOf(options, grid);
+  if (!own) return options.psnr;
+  const auto* psnr = std::get_if<PsnrGoal>(&*own);
   return psnr ? std::optional(psnr->psnr) : std::nullopt;
 }
 

@@ -3,13 +3,12 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <map>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "esvr/container.h"
+#include "esvr/convert_file.h"
 #include "esvr/encode.h"
 #include "esvr/vdb_io.h"
 #include "programs/command_line.h"
@@ -29,22 +28,13 @@ struct GridGoal {
   std::size_t place = 0;  ///< of the grid in the input (resolveNames)
 };
 
-/// What decides the conversion of a grid besides the options that all grids have in common: its volume,
-/// the peak of its PSNR, its range, and the index of its own goal.
-using SourceKey =
-    std::tuple<InputKey, std::optional<double>, std::optional<double>, std::optional<std::size_t>>;
-
 struct Options {
   std::filesystem::path input, output;
   cli::InputFiles inputs;
   /// The frames, if the input is a pattern. The output is a pattern, too, or one file for all
   /// frames.
   std::optional<cli::Sequence> sequence;
-  /// For a frame of a group: the frame before it as a reader gets it; null for the first one.
-  const EsvrFile* previous = nullptr;
-  /// The sources of its grids by FittedGrid::uniqueName. A grid with the same source is that of the
-  /// previous frame, so that a scene that stands still does not change.
-  const std::map<std::string, SourceKey>* previousSources = nullptr;
+  FrameBefore previous;  ///< of a frame of a group that is not the first one
   WantedGrids grids;
   bool shares = true;               ///< grids of a file share what they have in common
   ConvertOptions convert;           ///< options and goal of every grid; a size replaces the goal
@@ -85,10 +75,8 @@ struct Options {
 /// \throws UsageError  two goals are those of one grid
 void resolveNames(const VdbSummary& input, Options& options);
 
-/// The index in Options::gridGoals of a grid's own goal, if it has one.
-[[nodiscard]] std::optional<std::size_t> ownGoalOf(const Options& options, const FittedGrid& grid);
-
-[[nodiscard]] const Goal& goalOf(const Options& options, const FittedGrid& grid);
+/// The goal that a grid has instead of that of all others.
+[[nodiscard]] std::optional<Goal> ownGoalOf(const Options& options, const FittedGrid& grid);
 
 /// The PSNR that a grid should reach, dB over the box.
 [[nodiscard]] std::optional<double> wantedPsnrOf(const Options& options, const FittedGrid& grid);

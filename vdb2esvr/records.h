@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -114,8 +113,7 @@ struct FrameRecord {
   bool gridsDiffer = false;            ///< it begins a group because its grids differ
   std::optional<Error> failure{};
   nlohmann::ordered_json report{};  ///< the frame's own report, if one is wanted
-  /// Options::previousSources for the next frame of its group.
-  std::map<std::string, SourceKey> sources{};
+  std::vector<SourceKey> keys{};    ///< FrameBefore::keys for the next frame of its group
 };
 
 /// The figures of a file for all frames.

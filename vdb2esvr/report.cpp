@@ -298,8 +298,8 @@ Json curveOf(const std::vector<TimedCurvePoint>& curve) {
 /// What a grid gains by other grids of the file.
 Json sharedOf(const ConvertedGrid& grid) {
   if (!grid.shared) return nullptr;
-  const SharedBytes& shared = *grid.shared;
-  return {{"with", shared.with.empty() ? Json(nullptr) : Json(shared.with)},
+  const GridConversion::Shared& shared = *grid.shared;
+  return {{"with", grid.sharesWith.empty() ? Json(nullptr) : Json(grid.sharesWith)},
           {"bytes_with", shared.bytesWith},
           {"bytes_without", shared.bytesWithout},
           {"seconds", shared.seconds}};

@@ -8,13 +8,13 @@
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 #include <system_error>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "esvr/convert_file.h"
 #include "esvr/device.h"
 #include "esvr/error.h"
 #include "esvr/workers.h"
@@ -24,7 +24,6 @@
 #include "programs/names.h"
 #include "programs/run_main.h"
 #include "programs/workers.h"
-#include "vdb2esvr/byte_shares.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/convert.h"
 #include "vdb2esvr/options.h"
@@ -32,10 +31,7 @@
 #include "vdb2esvr/records.h"
 #include "vdb2esvr/report.h"
 #include "vdb2esvr/run_sequence.h"
-#include "vdb2esvr/share.h"
 #include "vdb2esvr/summary.h"
-#include "vdb2esvr/twins.h"
-#include "vdb2esvr/vectors.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -171,8 +167,20 @@ void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log&
              cli::shortNumber(grid.metrics.iou));
 }
 
-/// Converts the grids until all are done or the run is interrupted: small ones at the same time, and then
-/// one after the other. Grids with the same voxels are converted once.
+/// The largest size of the file. A frame of a sequence in which nothing is active has none, because no size
+/// could make it smaller.
+std::optional<std::uint64_t> sizeOf(const Options& options, const GridChoice& choice,
+                                    const VdbSummary& input) {
+  const auto isActive = [](const GridSummary& grid) { return grid.activeVoxels > 0; };
+  if (options.sequence && std::ranges::none_of(choice.fitted, isActive, &FittedGrid::source) &&
+      std::ranges::none_of(choice.carried, isActive, &NotFitted::grid))
+    return std::nullopt;
+  if (options.size || !options.ratio) return options.size;
+  return std::uint64_t(double(input.fileBytes) / *options.ratio);
+}
+
+/// Converts the grids of a file: shows the progress of each, goes on with another device where one fails, and
+/// measures what was made.
 class FileConversion {
  public:
   FileConversion(const Options& options, const std::vector<Device>& devices,
@@ -189,39 +197,69 @@ class FileConversion {
     runOn(devices);
   }
 
-  /// \param carried  grids that the file holds unchanged
-  void run(const std::vector<FittedGrid>& grids, const std::vector<CarriedGrid>& carried,
-           RunRecord& record) {
-    const Twins twins = findTwins(options_, grids);
-    ByteShares shares(options_, record.input, grids, twins, carried);
-    auto made = convertSmall(grids, twins);
-    for (const std::size_t g : orderOf(grids))
-      if (!made[g] && !twins.contains(g) && !cancelled()) made[g] = convert(g, grids[g], shares);
-    for (const auto& [g, twin] : twins)
-      if (made[twin.of]) made[g] = twinOf(*made[twin.of], grids[g], twin);
-    for (std::size_t g = 0; g < grids.size(); ++g)
-      if (made[g])
-        record.grids.push_back(std::move(*made[g]));
-      else
-        record.notFitted.push_back(grids[g].uniqueName);
-    collectVectors(record);
-    record.interrupted = cancelled();
+  /// Adds the grids, the vectors and what became of them to the record.
+  ConvertedFile run(const GridChoice& choice, RunRecord& record) {
+    fitted_ = choice.fitted;
+    measured_.resize(fitted_.size());
+    FileSource source = sourceOf(options_, record.input, choice);
+    if (options_.onlyFits)
+      for (GridSource& grid : source.grids)
+        grid.readCarried = nullptr;  // its fits are all that counts
+    ConvertedFile made = convertGrids(std::move(source), optionsOfFile(choice, record.input));
+    for (const GridConversion& grid : made.grids) record.grids.push_back(recordOf(grid));
+    listVectors(made, record);
+    listCarried(made, record);
+    record.interrupted = made.interrupted;
     if (record.interrupted && (!options_.keepsBest() || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
+    return made;
   }
 
-  /// The device of fits, which is another one if the first has failed.
-  [[nodiscard]] const Device& device() const { return options_.convert.fit.device; }
-
  private:
-  [[nodiscard]] bool cancelled() const { return options_.convert.fit.cancel->cancelled(); }
-
   /// What an interrupted run leaves.
   [[nodiscard]] std::string whatIsLeft() const {
     if (!options_.resume) return "nothing was written";
     return "the finished parts are in " + partsFolder(options_).string() +
            ", and the same command continues";
   }
+
+  FileOptions optionsOfFile(const GridChoice& choice, const VdbSummary& input) {
+    FileOptions options{.convert = options_.convert};
+    options.size = sizeOf(options_, choice, input);
+    options.shares = options_.shares && !options_.onlyFits;
+    options.severalAtOnce = !parts_.haveRanks();
+    options.paper = options_.paper;
+    options.previous = options_.previous;
+    options.onStep = [this](const GridStep& step) { runStep(step); };
+    options.onConverted = [this](const VolumeGrid& grid, const GridConversion& made) {
+      measured_[made.source] = measured(options_, fitted_[made.source], grid, made, device());
+    };
+    // The parts of a single fit do not depend on the storage, and compact storage takes time.
+    if (options_.onlyFits && std::holds_alternative<FitGoal>(options.convert.goal))
+      options.convert.storage.form = Storage::kFloat32;
+    return options;
+  }
+
+  /// Runs a step. If a device fails, for example because its memory is full, the next one of several, or the
+  /// CPU in place of the GPU that "auto" selected, takes this step and all later ones.
+  void runStep(const GridStep& step) {
+    const FittedGrid& grid = fitted_[step.grid];
+    if (!step.isAlone) return sayingTheWayOut(grid, step.run);
+    ProgressBar bar(grid.uniqueName, options_.progress, options_.verbosity);
+    step.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
+    for (;;) {
+      step.fit.device = device();
+      step.fit.parts = options_.convert.fit.parts;
+      try {
+        return sayingTheWayOut(grid, step.run);
+      } catch (const DeviceError& error) {
+        if (!replaceDevice(error)) throw;
+      }
+    }
+  }
+
+  /// The device of fits, which is another one if the first has failed.
+  [[nodiscard]] const Device& device() const { return options_.convert.fit.device; }
 
   void runOn(std::vector<Device> devices) {
     devices_ = std::move(devices);
@@ -234,90 +272,6 @@ class FileConversion {
 
   void tellLost(const Device& device, const std::string& why, const std::string& next) const {
     log_.warning(deviceName(device) + " is not used any more: " + why + "; " + next);
-  }
-
-  /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
-  /// keeps few threads and little of a GPU busy.
-  /// \return a conversion for each grid, or nothing for those that are left to convert
-  std::vector<std::optional<ConvertedGrid>> convertSmall(const std::vector<FittedGrid>& grids,
-                                                         const Twins& twins) const {
-    constexpr std::uint64_t kMostActive = std::uint64_t{1} << 19;
-    constexpr int kAtOnce = 4;  // as many frames of a sequence use a GPU
-    std::vector<std::optional<ConvertedGrid>> made(grids.size());
-    // A single fit takes the time that was asked for, and shows its progress.
-    const bool isSingleFit =
-        options_.convert.fit.seconds || std::holds_alternative<FitGoal>(options_.convert.goal);
-    const bool areIndependent = !options_.size && !options_.ratio && !parts_.haveRanks();
-    if (isSingleFit || !areIndependent || grids.size() < 2) return made;
-    std::vector<std::size_t> small;
-    for (std::size_t g = 0; g < grids.size(); ++g)
-      if (!twins.contains(g) && grids[g].source.activeVoxels <= kMostActive) small.push_back(g);
-    const CancelToken& cancel = *options_.convert.fit.cancel;
-    const int workers = std::min(kAtOnce, cli::taskWorkers(options_.threads, small.size()));
-    cli::forEachTask({small.size(), workers, cli::OnFrameError::kStop, cancel}, [&](auto task) {
-      const std::size_t g = small[task.index];
-      const CancelScope scope(&cancel);
-      try {
-        made[g] = convertGrid(options_, grids[g], std::nullopt);
-      } catch (const DeviceError&) {  // it is converted again where another device can take over
-      } catch (const Cancelled&) {
-      }
-      return true;
-    });
-    return made;
-  }
-
-  /// The order in which grids are converted. Those that share a size begin with the one that takes the fewest
-  /// bytes for its voxels in the source, since it probably leaves most of its share to the others.
-  [[nodiscard]] std::vector<std::size_t> orderOf(const std::vector<FittedGrid>& grids) const {
-    std::vector<std::size_t> order(grids.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto bytesEach = [&](std::size_t g) {
-      const GridSummary& source = grids[g].source;
-      return double(source.storedBytes) / double(source.activeVoxels + 1);
-    };
-    if (options_.size || options_.ratio) std::ranges::stable_sort(order, {}, bytesEach);
-    return order;
-  }
-
-  /// \return nothing if the run was interrupted before the fit had a result
-  std::optional<ConvertedGrid> convert(std::size_t g, const FittedGrid& fitted,
-                                       ByteShares& shares) try {
-    ProgressBar bar(fitted.uniqueName, options_.progress, options_.verbosity);
-    options_.convert.fit.progress = [&](const FitProgress& progress) { bar.show(progress); };
-    return convertToShare(g, fitted, shares);
-  } catch (const Cancelled&) {
-    return std::nullopt;
-  }
-
-  /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for
-  /// every section. How many there are is known after a conversion only; where they exceed what is
-  /// reserved for the twins, the grid is converted again to fewer bytes.
-  ConvertedGrid convertToShare(std::size_t g, const FittedGrid& fitted, ByteShares& shares) {
-    std::optional<std::uint64_t> bytes = shares.of(g);
-    ConvertedGrid grid = convertWhereItFits(fitted, bytes);
-    const auto excessOf = [&]() -> std::uint64_t {
-      const BestSoFar completion;
-      // No grid follows an interrupted one.
-      return cancelled() ? 0 : shares.take(g, grid.stored(), previousOf(options_, fitted));
-    };
-    while (const std::uint64_t excess = excessOf()) {
-      bytes = *bytes - std::min(*bytes, excess);
-      grid = convertWhereItFits(fitted, bytes);
-    }
-    return grid;
-  }
-
-  /// Converts a grid. If a device fails, for example because its memory is full, the next one of
-  /// several, or the CPU in place of the GPU that "auto" selected, converts this grid and all later ones.
-  ConvertedGrid convertWhereItFits(const FittedGrid& fitted, std::optional<std::uint64_t> bytes) {
-    for (;;) {
-      try {
-        return convertGrid(options_, fitted, bytes);
-      } catch (const DeviceError& error) {
-        if (!replaceDevice(error)) throw;
-      }
-    }
   }
 
   /// \return false if there is no device to go on with
@@ -335,41 +289,48 @@ class FileConversion {
     return true;
   }
 
+  /// What was measured of a grid, or of the one whose voxels it has.
+  [[nodiscard]] ConvertedGrid recordOf(const GridConversion& made) const {
+    const FittedGrid& fitted = fitted_[made.source];
+    ConvertedGrid grid = *measured_[made.convertedAs];
+    static_cast<GridConversion&>(grid) = made;
+    grid.uniqueName = fitted.uniqueName;
+    grid.sourceName = fitted.source.uniqueName;
+    grid.id = {fitted.place, fitted.component};
+    if (made.convertedAs != made.source) grid.seconds = {.read = made.secondsRead};
+    if (made.twinOf) grid.sameAs = fitted_[*made.twinOf].uniqueName;
+    if (made.shared && made.shared->with) grid.sharesWith = fitted_[*made.shared->with].uniqueName;
+    return grid;
+  }
+
+  void listVectors(const ConvertedFile& made, RunRecord& record) const {
+    for (const StoredVector& vector : made.file.vectors) {
+      const FittedGrid& grid = fitted_[made.grids[vector.first].source];
+      record.vectors.push_back({grid.source.uniqueName, grid.place, grid.source.valueType, vector});
+    }
+  }
+
+  /// Lists the vectors that are carried after all, at their places, and the grids that were not converted.
+  void listCarried(const ConvertedFile& made, RunRecord& record) const {
+    for (const auto& [place, bytes] : made.carriedVectors) {
+      const auto at = std::ranges::lower_bound(record.carried, place, {}, &NotFitted::place);
+      record.carried.insert(at, {record.input.grids[place], place,
+                                 "its components would take " + std::to_string(bytes) + " bytes"});
+    }
+    for (std::size_t g = 0; g < fitted_.size(); ++g)
+      if (std::ranges::count(made.grids, g, &GridConversion::source) == 0 &&
+          std::ranges::count(made.carriedVectors, fitted_[g].place, &CarriedVector::place) == 0)
+        record.notFitted.push_back(fitted_[g].uniqueName);
+  }
+
   Options options_;
   Parts& parts_;
   const cli::Log& log_;
   std::vector<Device> devices_;  ///< those that have not failed
   std::future<void> started_;    ///< the device starts while the first grid is read; may be empty
+  std::vector<FittedGrid> fitted_;
+  std::vector<std::optional<ConvertedGrid>> measured_;  ///< of `fitted_`
 };
-
-/// Gives the carried grids their places among those that the file holds.
-void placeCarried(const RunRecord& record, std::vector<CarriedGrid>& carried) {
-  std::size_t converted = 0;
-  for (std::size_t c = 0; c < carried.size(); ++c) {
-    while (converted < record.grids.size() && record.grids[converted].id.place < carried[c].place)
-      ++converted;
-    carried[c].place = std::uint32_t(converted + c);
-  }
-}
-
-/// The file of the converted and the carried grids.
-EsvrFile assemble(std::vector<CarriedGrid> carried, const RunRecord& record) {
-  EsvrFile file;
-  placeCarried(record, carried);
-  file.carried = std::move(carried);
-  file.metadata = record.input.metadata;
-  for (const auto& grid : record.grids) file.grids.push_back(grid.stored());
-  for (const auto& vector : record.vectors) file.vectors.push_back(vector.stored);
-  return file;
-}
-
-/// The file, after vectors that are smaller unchanged were carried. An interrupted run tries none.
-EsvrFile carriedAndConverted(const Options& options, std::vector<CarriedGrid> carried,
-                             RunRecord& record) {
-  const Completion completion;
-  if (!record.interrupted) carrySmallerVectors(options, record, carried);
-  return assemble(std::move(carried), record);
-}
 
 void tellResult(const Options& options, const RunRecord& record) {
   if (!options.report.empty())
@@ -400,30 +361,6 @@ std::vector<Device> devicesFor(const Options& options, const Ranks* ranks) {
   std::vector<Device> devices = selectDevices(options.device);
   if (isAny && devices.front().kind == DeviceKind::kCuda) devices = selectDevices("cuda:all");
   return {devices[std::size_t(ranks->rankOnHost()) % devices.size()]};
-}
-
-/// Reads the grids that the file holds unchanged. A process that only fits needs none.
-std::vector<CarriedGrid> readUnchanged(const Options& options,
-                                       const std::vector<NotFitted>& carried) {
-  std::vector<std::size_t> places;
-  for (const auto& grid : carried) places.push_back(grid.place);
-  if (options.onlyFits || places.empty()) return {};
-  return readCarried(options.input, places, options.read);
-}
-
-/// The options with the memory that carried grids leave.
-Options besides(const std::vector<CarriedGrid>& carried, Options options) {
-  for (const auto& grid : carried)
-    if (const std::uint64_t bytes = grid.bytes.size(); !options.read.memory.isInFile(bytes))
-      options.read.maxBytes -= std::min(options.read.maxBytes, bytes);
-  return options;
-}
-
-/// The options of conversions after the fits.
-Options optionsOfFits(Options options, const CancelToken& cancel, const Device& device) {
-  options.convert.fit.cancel = &cancel;
-  options.convert.fit.device = device;
-  return options;
 }
 
 }  // namespace
@@ -464,31 +401,27 @@ RunRecord convertWatched(const Options& given, const FileRun& run,
   carryInactiveValues(
       options, [&](std::string text) { log.warning(std::move(text)); }, choice);
   tellNothingFitted(choice, log);
-  std::vector<CarriedGrid> carried = readUnchanged(options, choice.carried);
-  record.carried = std::move(choice.carried);
+  record.carried = choice.carried;
   record.skipped = std::move(choice.skipped);
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
-  findScales(besides(carried, options), choice.fitted);
   Parts parts(options, selected.front(), ranks);
-  FileConversion conversion(besides(carried, options), selected, cancel, parts, log);
-  conversion.run(choice.fitted, carried, record);
+  const ConvertedFile made =
+      FileConversion(options, selected, cancel, parts, log).run(choice, record);
   for (const auto& grid : record.grids) tellGrid(options, grid, log);
   if (options.onlyFits) return record;
-  EsvrFile file = carriedAndConverted(options, std::move(carried), record);
-  shareGrids(optionsOfFits(options, cancel, conversion.device()), choice.fitted, file, record);
-  const bool isShared = file.layout == FileLayout::kCompact;
-  if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
   watched.requireUnchanged();  // the grids were read one after the other
   // There is nothing of a lossless conversion to keep before it is complete.
   std::optional<Completion> completion;
   if (!std::holds_alternative<LosslessGoal>(options.convert.goal)) completion.emplace();
   cli::Stopwatch writing;
-  record.output = run.store(file);
+  record.output = run.store(made.file);
   record.secondsWrite = writing.lap();
   if (!completion) completion.emplace();  // the file is there, and so will be its report
-  if (!record.interrupted) measureVectors(options, file, record);
-  if (isShared) record.bytesSeparate = bytesWithoutSharing(file, record);
+  for (ConvertedVector& vector : record.vectors)
+    if (!record.interrupted)
+      vector.metrics = measureVector(options, made.file, vector.stored, vector.place);
+  if (made.isShared) record.bytesSeparate = bytesWithoutSharing(made, record.output);
   if (!record.interrupted) parts.remove();
   record.secondsTotal = watch.lap();
   return record;

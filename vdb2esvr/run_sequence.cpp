@@ -10,6 +10,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -25,7 +26,6 @@
 #include "programs/run_main.h"
 #include "programs/sequence.h"
 #include "programs/workers.h"
-#include "vdb2esvr/group_plan.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/records.h"
@@ -349,6 +349,78 @@ class SequenceConversion {
   FrameConversion conversion_;
 };
 
+// The groups of one file.
+
+/// The indices of the frames of a group.
+using PlannedGroup = std::vector<std::size_t>;
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw UsageError("the partial file " + why +
+                   "; --resume continues a run with the same options only");
+}
+
+/// The planned group of each frame, by the number of the frame.
+std::map<cli::FrameNumber, std::size_t> groupsByNumber(const std::vector<cli::Frame>& frames,
+                                                       const std::vector<PlannedGroup>& planned) {
+  std::map<cli::FrameNumber, std::size_t> groups;
+  for (std::size_t g = 0; g < planned.size(); ++g)
+    for (const std::size_t frame : planned[g]) groups[frames[frame].number] = g;
+  return groups;
+}
+
+bool hasAll(const std::vector<cli::Frame>& frames, const PlannedGroup& group,
+            const std::set<cli::FrameNumber>& stored) {
+  return std::ranges::all_of(
+      group, [&](std::size_t frame) { return stored.contains(frames[frame].number); });
+}
+
+/// Divides frames with increasing numbers into groups of kGroupFrames; the last one may have fewer. A
+/// frame that holds another one is in the group of that frame. Frames that
+/// are left out are in no group.
+std::vector<PlannedGroup> planGroups(const std::vector<cli::Frame>& frames) {
+  std::vector<PlannedGroup> groups;
+  std::size_t withInput =
+      kGroupFrames;  // frames with an input in the last group; no frame is held by it
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].missing && !frames[i].holds) continue;
+    if (!frames[i].holds && withInput++ == kGroupFrames) groups.emplace_back(), withInput = 1;
+    groups.back().push_back(i);
+  }
+  return groups;
+}
+
+/// What a run that continues another one keeps of its partial file.
+struct KeptGroups {
+  std::size_t planned = 0;  ///< number of planned groups that are complete
+  std::size_t stored = 0;   ///< number of groups of the partial file that hold them
+};
+
+/// Finds the planned groups that a partial file has completely. A planned group may be several
+/// groups of the file. It may lack frames that could not be converted, if the file has frames of a
+/// later group.
+/// \param stored  the frames of the partial file
+/// \throws UsageError  the partial file has frames or groups that are not planned
+KeptGroups keptGroups(const std::vector<cli::Frame>& frames,
+                      const std::vector<PlannedGroup>& planned,
+                      const std::vector<SequenceFrame>& stored) {
+  if (stored.empty()) return {};
+  const auto groups = groupsByNumber(frames, planned);
+  std::set<cli::FrameNumber> numbers;
+  std::optional<std::size_t> last;  // planned group of the frame before
+  KeptGroups kept;
+  for (const SequenceFrame& frame : stored) {
+    const auto group = groups.find(frame.number);
+    if (group == groups.end()) refuse("has frame " + std::to_string(frame.number));
+    const bool beginsStored = numbers.empty() || frame.group != stored[numbers.size() - 1].group;
+    if (last && *last != group->second && !beginsStored) refuse("has other groups");
+    if (last != group->second) kept = {group->second, frame.group};
+    last = group->second;
+    numbers.insert(frame.number);
+  }
+  if (hasAll(frames, planned[*last], numbers)) kept = {*last + 1, stored.back().group + 1};
+  return kept;
+}
+
 // One file for all frames.
 
 bool areAlike(const StoredGrid& a, const StoredGrid& b) {
@@ -403,11 +475,10 @@ class GroupConversion {
     FrameRecord& frame = conversion_.frames()[index];
     Options own = conversion_.optionsOf(frame.frame, worker_);
     own.resume = false;  // the group is converted again as a whole
-    own.previous = previous_ ? &*previous_ : nullptr;
-    own.previousSources = &sources_;
+    if (previous_) own.previous = {&*previous_, keys_};
     conversion_.convert(own, frame, [&](const EsvrFile& file) { return encode(index, file); });
     keepEncoded();
-    sources_ = std::exchange(frame.sources, {});
+    keys_ = std::exchange(frame.keys, {});
   }
 
   void hold(std::size_t index) {
@@ -442,10 +513,10 @@ class GroupConversion {
   const ReadLimits limits_;
   bool isWell_ = true;
   std::vector<EncodedFrame> encoded_;
-  std::optional<EsvrFile> previous_;          ///< the last frame of the group as a reader gets it
-  std::map<std::string, SourceKey> sources_;  ///< of its grids
-  EncodedFrame last_;                         ///< the frame that was encoded last
-  EsvrFile decoded_;                          ///< the same as a reader gets it
+  std::optional<EsvrFile> previous_;  ///< the last frame of the group as a reader gets it
+  std::vector<SourceKey> keys_;       ///< of its grids
+  EncodedFrame last_;                 ///< the frame that was encoded last
+  EsvrFile decoded_;                  ///< the same as a reader gets it
 };
 
 PartialSequence partialOf(const Options& options) {

@@ -10,7 +10,7 @@
 
 #include "programs/messages.h"
 #include "programs/names.h"
-#include "vdb2esvr/group_plan.h"
+#include "vdb2esvr/run_sequence.h"
 
 namespace esvr::vdb2esvr {
 
@@ -112,8 +112,8 @@ void printNote(const ConvertedGrid& grid, std::ostream& out) {
 /// Says which grids the voxels of others refer to, and what that saved.
 void printShared(const RunRecord& record, std::ostream& out) {
   for (const ConvertedGrid& grid : record.grids)
-    if (grid.shared && !grid.shared->with.empty() && !grid.twinOf)
-      out << cli::printable(grid.uniqueName) << ": refers to " << cli::printable(grid.shared->with)
+    if (grid.shared && !grid.sharesWith.empty() && !grid.twinOf)
+      out << cli::printable(grid.uniqueName) << ": refers to " << cli::printable(grid.sharesWith)
           << ", with " << grid.shared->bytesWith << " bytes rather than "
           << grid.shared->bytesWithout << '\n';
   if (record.bytesSeparate > record.output.fileBytes)

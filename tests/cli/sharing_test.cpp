@@ -3,8 +3,7 @@
 // as if there were one grid after the other. One grid can be read back without the others. Single
 // grids have goals of their own. Names that do not exist and goals that exclude each other are
 // refused. vdb2esvr converts and stores grids with the same voxels once. Each comes back with its
-// own name, transform and metadata. Grids that differ in a voxel or in whether they are a level
-// set are converted apart. With a size, the bytes that twins do not take go to the other grids.
+// own name, transform and metadata. What is shared and when is tested in tests/encode/convert_file_test.cpp.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -148,16 +147,6 @@ TEST_F(SharingGrids, mayHaveGoalsOfTheirOwn) {
   EXPECT_EQ(report["asked"]["goals"][0]["grid"], "heat");
 }
 
-TEST_F(SharingGrids, keepToTheirOwnGoalsWhileTheyShare) {
-  constexpr double kBound = 0.02;
-  const Json report = convert({"--psnr", "heat=50", "--max-error", "density=0.02"});
-  const Json& grids = report["grids"];
-  EXPECT_LE(grids[0]["metrics"]["max_error"], kBound);
-  EXPECT_GE(grids[1]["metrics"]["psnr_box"], 50.0);
-  EXPECT_GE(grids[2]["metrics"]["psnr_active"], kStandardPsnr);
-  EXPECT_EQ(report["asked"]["goals"].size(), 2u);
-}
-
 TEST_F(SharingGrids, withTwoGoalsAreRefused) {
   for (const Arguments& options : {Arguments{"--psnr", "heat=40,heat=50"},
                                    {"--psnr", "heat=40", "--max-error", "heat=1%"},
@@ -253,65 +242,11 @@ TEST_F(Twins, areListedWithoutCountingTheirBytesTwice) {
   EXPECT_THAT(list.out, HasSubstr(" " + grids[2]["bytes"].dump() + " "));
 }
 
-TEST_F(Twins, areNotGridsThatDifferInOneVoxelOrInTheirClass) {
-  std::vector<InputVoxel> other = softBall({});
-  other[100].value += 1e-6f;
-  const std::vector<InputVoxel> band = test::distances(10);
-  const Json grids = convert({{.name = "a", .voxels = softBall({})},
-                              {.name = "b", .voxels = other},
-                              {.name = "c", .voxels = band, .background = 20.0f},
-                              {.name = "d", .voxels = band, .background = 20.0f, .levelSet = true}},
-                             kQuick)["grids"];
-  for (const Json& grid : grids) EXPECT_TRUE(grid["same_as"].is_null()) << grid["name"];
-}
-
 TEST_F(Twins, ofATwinAreNamedAfterTheFirst) {
   const InputGrid ball{.voxels = softBall({})};
   const Json grids = convert({ball, ball, ball}, kQuick)["grids"];
   EXPECT_EQ(grids[1]["same_as"], "density[0]");
   EXPECT_EQ(grids[2]["same_as"], "density[0]");
-}
-
-// ---- with a size
-
-std::vector<std::string> sized(std::uint64_t bytes) {
-  return {"--size", std::to_string(bytes), "--iterations", "60", "--representation", "ellipsoids"};
-}
-
-TEST_F(Twins, leaveTheirShareToTheOthers) {
-  constexpr std::uint64_t kSize = 4000;
-  const InputGrid red{.name = "red", .voxels = test::cloud(12)};
-  InputGrid green = red, blue = red, last = red;
-  green.name = "green", blue.name = "blue", last.name = "last";
-  for (InputVoxel& voxel : last.voxels) voxel.value *= 3.0f;
-  const auto ellipsoids = [](const Json& report) {
-    std::uint64_t sum = 0;
-    for (const Json& grid : report["grids"])
-      if (grid["same_as"].is_null()) sum += grid["ellipsoids"].get<std::uint64_t>();
-    return sum;
-  };
-  const auto alone = ellipsoids(convert({red, last}, sized(kSize)));
-  const auto withTwins =
-      ellipsoids(convert({red, green, blue, last}, sized(kSize + 2 * kBytesOfATwin)));
-  EXPECT_GE(withTwins, alone);
-  EXPECT_LE(outBytes(), kSize + 2 * kBytesOfATwin);
-  EXPECT_GE(double(outBytes()), 0.97 * double(kSize + 2 * kBytesOfATwin));
-}
-
-/// Each ball is in a chunk of its own, and a twin has a row of the table for each of them. That is
-/// more than is reserved for a twin before the number of chunks is known.
-TEST_F(Twins, keepToTheSizeWhereTheyHaveManySections) {
-  constexpr std::uint64_t kSize = 5000;
-  InputGrid red{.name = "red"};
-  for (int i = 0; i < 8; ++i)
-    for (const InputVoxel& voxel : softBall({5000 * i, 0, 0})) red.voxels.push_back(voxel);
-  InputGrid green = red;
-  green.name = "green";
-  const Json grids = convert({red, green}, sized(kSize))["grids"];
-  EXPECT_EQ(grids[1]["same_as"], "red");
-  EXPECT_GE(grids[1]["sections"].size(), 8u);
-  EXPECT_LE(outBytes(), kSize);
-  EXPECT_GE(double(outBytes()), 0.9 * double(kSize));
 }
 
 TEST_F(Twins, RealFileHasThreeColoursInTheBytesOfOne) {

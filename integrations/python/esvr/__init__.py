@@ -5,6 +5,7 @@
     grid = esvr.fit(volume, psnr=40)
     esvr.write("smoke.esvr", [grid])
     grid.render()                       # a picture as an array
+    esvr.write("all.esvr", esvr.convert("smoke.vdb"))   # all grids, as vdb2esvr converts them
 
 All coordinates are those of the index space: voxel (i, j, k) lies at (i, j, k), and arrays have the axes
 x, y, z.
@@ -12,11 +13,11 @@ x, y, z.
 from . import _html, _openvdb
 from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, GridBuilder,
                     MemoryExceeded, Metrics, PackedGrid, Sequence, TargetMissed, UsageError, Volume,
-                    __version__, compare, fit, frames, list_grids, read, write, write_vdb)
+                    __version__, compare, convert, fit, frames, list_grids, read, write, write_vdb)
 
 __all__ = ["BadInput", "Cancelled", "DeviceError", "Ellipsoids", "Error", "File", "Grid", "GridBuilder",
            "MemoryExceeded", "Metrics", "PackedGrid", "Sequence", "TargetMissed", "UsageError", "Volume",
-           "__version__", "compare", "fit", "frames", "list_grids", "read", "write", "write_vdb"]
+           "__version__", "compare", "convert", "fit", "frames", "list_grids", "read", "write", "write_vdb"]
 
 Volume._repr_html_ = _html.of_volume
 Grid._repr_html_ = _html.of_grid

@@ -197,5 +197,12 @@ def fit(volume: Volume, *, psnr: Optional[float] = None, picture_psnr: Optional[
         lossless: bool = False, preset: str = "standard", measure: str = "auto", tone: Optional[float] = None,
         effort: int = 5, representation: str = "auto", storage: str = "compact", device: str = "auto",
         seed: int = 1, progress: Optional[Callable[[float], object]] = None) -> Grid: ...
+def convert(source: Union[str, PathLike[str], SequenceOf[Volume]], *,
+            psnr: Optional[float] = None, picture_psnr: Optional[float] = None,
+            max_error: Optional[float] = None, max_relative_error: Optional[float] = None,
+            relative_floor: Optional[float] = None, size: Optional[int] = None, count: Optional[int] = None,
+            lossless: bool = False, preset: str = "standard", measure: str = "auto", tone: Optional[float] = None,
+            effort: int = 5, representation: str = "auto", storage: str = "compact", device: str = "auto",
+            seed: int = 1, progress: Optional[Callable[[float], object]] = None) -> File: ...
 def compare(reference: Union[Volume, Grid], candidate: Union[Volume, Grid], *, box: Optional[Box] = None,
             peak: Optional[float] = None, ssim: bool = False) -> Metrics: ...

@@ -1,13 +1,16 @@
-// esvr.Grid and esvr.Ellipsoids, and esvr.fit, which makes grids.
+// esvr.Grid and esvr.Ellipsoids, and esvr.fit and esvr.convert, which make grids and files.
 
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <cmath>
 #include <exception>
 #include <functional>
 #include <span>
+#include <variant>
 
+#include "esvr/convert_file.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -197,7 +200,7 @@ void addGrid(py::module_& module) {
       .def("__repr__", &gridText);
 }
 
-// esvr.fit.
+// esvr.fit and esvr.convert.
 
 namespace {
 
@@ -282,33 +285,76 @@ class Reporter {
   std::exception_ptr raised_;
 };
 
-Conversion convertWith(const Volume& volume, ConvertOptions options, CancelToken& token) {
-  options.fit.cancel = &token;
-  const VolumeGrid& source = *volume.grid;
-  return convertVolume({source.descriptor, source.volume}, options);
-}
-
-Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progress& progress) {
+/// The result of `work`, which gets the options with progress. Ctrl-C and an exception of `progress` end it.
+template <class Work>
+auto reporting(ConvertOptions options, const Progress& progress, const Work& work) {
   CancelToken token;
   Reporter reporter(progress, token);
-  ConvertOptions reporting = options;
-  if (progress) reporting.fit.progress = std::ref(reporter);
+  if (progress) options.fit.progress = std::ref(reporter);
+  options.fit.cancel = &token;
   auto running = std::async(std::launch::async, [&] {
     const CancelScope scope(&token);
-    return convertWith(volume, std::move(reporting), token);
+    return work(options);
   });
-  Conversion conversion;
   try {
-    conversion = waitFor(running, token);
+    auto result = waitFor(running, token);
+    reporter.rethrow();
+    return result;
   } catch (const Cancelled&) {
     reporter.rethrow();
     throw;
   }
-  reporter.rethrow();
-  if (conversion.fit.end == FitEnd::kPsnrMissed)
-    throw TargetMissed("grid '" + shownName(volume.grid->descriptor.name) +
+}
+
+void requirePsnr(const Conversion& made) {
+  if (made.fit.end == FitEnd::kPsnrMissed)
+    throw TargetMissed("grid '" + shownName(made.grid.descriptor.name) +
                        "': the PSNR is out of reach");
-  return {std::make_shared<const StoredGrid>(std::move(conversion.grid))};
+}
+
+Grid fitVolume(const Volume& volume, const ConvertOptions& options, const Progress& progress) {
+  const VolumeGrid& source = *volume.grid;
+  Conversion made = reporting(options, progress, [&](const ConvertOptions& given) {
+    return convertVolume({source.descriptor, source.volume}, given);
+  });
+  requirePsnr(made);
+  return {std::make_shared<const StoredGrid>(std::move(made.grid))};
+}
+
+/// What esvr.convert takes: a file, or volumes.
+using ConvertedSource = std::variant<std::filesystem::path, std::vector<Volume>>;
+
+bool isLossless(const ConvertOptions& options) {
+  return std::holds_alternative<LosslessGoal>(options.goal);
+}
+
+FileSource sourceOf(const ConvertedSource& given, bool lossless) {
+  if (const auto* path = std::get_if<std::filesystem::path>(&given))
+    return readSources(*path, lossless, {.maxBytes = usualMemoryLimit()});
+  FileSource source;
+  for (const auto& [grid, rounded] : std::get<std::vector<Volume>>(given)) {
+    const std::uint64_t active = activeVoxelCount(grid->volume);
+    source.grids.push_back({.name = grid->descriptor.name,
+                            .place = source.grids.size(),
+                            .activeVoxels = active,
+                            .storedBytes = active * sizeof(float),
+                            .activeBox = activeBox(grid->volume),
+                            .read = [grid = grid] { return *grid; }});
+  }
+  return source;
+}
+
+File convertSource(const ConvertedSource& given, const ConvertOptions& options,
+                   const Progress& progress) {
+  ConvertedFile made = reporting(options, progress, [&](const ConvertOptions& common) {
+    FileOptions ofFile{.convert = common};
+    if (const auto* size = std::get_if<SizeGoal>(&common.goal)) ofFile.size = size->bytes;
+    return convertGrids(sourceOf(given, isLossless(common)), ofFile);
+  });
+  if (made.interrupted) throw Cancelled();
+  if (std::holds_alternative<PsnrGoal>(options.goal))  // a preset is as good as the grids allow
+    for (const GridConversion& grid : made.grids) requirePsnr(grid.conversion);
+  return {std::make_shared<const EsvrFile>(std::move(made.file))};
 }
 
 /// Warns of what a grid without loss does not hold.
@@ -320,8 +366,17 @@ void tellLostValues(const Volume& volume) {
   if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
 }
 
-constexpr const char* kFitText =
-    "Converts a volume to a Grid. One of the goals may be given:\n\n"
+constexpr const char* kFitText = "Converts a volume to a Grid. ";
+
+constexpr const char* kConvertText =
+    "Converts all grids of a .vdb or .nvdb file, or a list of volumes, to a File, as vdb2esvr "
+    "does:\n"
+    "grids of equal voxels once, vectors, grids that are carried unchanged, and voxels that refer "
+    "to\n"
+    "those of a grid that is like them. size is that of the file. ";
+
+constexpr const char* kGoalText =
+    "One of the goals may be given:\n\n"
     "psnr: the smallest grid of this PSNR over the box, dB; max_error: a bound on the error of\n"
     "every voxel; size: the best grid of this number of bytes; count: a number of ellipsoids;\n"
     "lossless: every active voxel bit for bit; picture_psnr: the smallest grid whose "
@@ -345,16 +400,22 @@ constexpr const char* kFitText =
 
 }  // namespace
 
-void addFit(py::module_& module) {
+namespace {
+
+/// Defines a function that makes a Grid or a File for a goal.
+template <class Source, class Convert>
+void defineConversion(py::module_& module, const char* name, const char* source, const char* text,
+                      const Convert& convertFrom) {
   module.def(
-      "fit",
-      [](const Volume& volume, std::optional<double> psnr, std::optional<double> picturePsnr,
-         std::optional<double> maxError, std::optional<double> maxRelativeError,
-         std::optional<double> relativeFloor, std::optional<std::uint64_t> size,
-         std::optional<std::size_t> count, bool lossless, const std::string& preset,
-         const std::string& measure, std::optional<float> tone, int effort,
-         const std::string& representation, const std::string& storage, const std::string& device,
-         std::uint64_t seed, const Progress& progress) {
+      name,
+      [convertFrom](const Source& from, std::optional<double> psnr,
+                    std::optional<double> picturePsnr, std::optional<double> maxError,
+                    std::optional<double> maxRelativeError, std::optional<double> relativeFloor,
+                    std::optional<std::uint64_t> size, std::optional<std::size_t> count,
+                    bool lossless, const std::string& preset, const std::string& measure,
+                    std::optional<float> tone, int effort, const std::string& representation,
+                    const std::string& storage, const std::string& device, std::uint64_t seed,
+                    const Progress& progress) {
         ConvertOptions options;
         options.goal = goalOf(
             {psnr, picturePsnr, maxError, maxRelativeError, relativeFloor, size, count, lossless});
@@ -373,17 +434,35 @@ void addFit(py::module_& module) {
         options.fit.count = count;
         options.fit.seed = seed;
         options.fit.device = selectDevice(device);
-        if (lossless) tellLostValues(volume);
-        return fitVolume(volume, options, progress);
+        return convertFrom(from, options, progress);
       },
-      py::arg("volume"), py::kw_only(), py::arg("psnr") = py::none(),
+      py::arg(source), py::kw_only(), py::arg("psnr") = py::none(),
       py::arg("picture_psnr") = py::none(), py::arg("max_error") = py::none(),
       py::arg("max_relative_error") = py::none(), py::arg("relative_floor") = py::none(),
       py::arg("size") = py::none(), py::arg("count") = py::none(), py::arg("lossless") = false,
       py::arg("preset") = "standard", py::arg("measure") = "auto", py::arg("tone") = py::none(),
       py::arg("effort") = kUsualEffort, py::arg("representation") = "auto",
       py::arg("storage") = "compact", py::arg("device") = "auto", py::arg("seed") = 1,
-      py::arg("progress") = py::none(), kFitText);
+      py::arg("progress") = py::none(), (std::string(text) + kGoalText).c_str());
+}
+
+}  // namespace
+
+void addFit(py::module_& module) {
+  defineConversion<Volume>(
+      module, "fit", "volume", kFitText,
+      [](const Volume& volume, const ConvertOptions& options, const Progress& progress) {
+        if (isLossless(options)) tellLostValues(volume);
+        return fitVolume(volume, options, progress);
+      });
+  defineConversion<ConvertedSource>(
+      module, "convert", "source", kConvertText,
+      [](const ConvertedSource& source, const ConvertOptions& options, const Progress& progress) {
+        if (const auto* volumes = std::get_if<std::vector<Volume>>(&source); volumes)
+          for (const Volume& volume : *volumes)
+            if (isLossless(options)) tellLostValues(volume);
+        return convertSource(source, options, progress);
+      });
 }
 
 }  // namespace esvr::python

@@ -27,26 +27,32 @@
 namespace esvr {
 
 /// A single fit, which ends as FitOptions determine.
-struct FitGoal {};
+struct FitGoal {
+  friend auto operator<=>(const FitGoal&, const FitGoal&) = default;
+};
 
 /// The smallest grid found with the quality that FitOptions::preset stands for: presetPicturePsnr() if the
 /// measure is what is seen, presetSurfaceBound() for a level set that is no narrow band (isNarrowBand,
 /// grid_coding.h), and otherwise an error of at most that of presetPsnr() over the active voxels.
 /// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
 /// as high. FitOptions::count, psnr and seconds are ignored.
-struct PresetGoal {};
+struct PresetGoal {
+  friend auto operator<=>(const PresetGoal&, const PresetGoal&) = default;
+};
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
 /// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid.
 /// FitOptions::count, psnr and seconds are ignored.
 struct SizeGoal {
   std::uint64_t bytes = 0;
+  friend auto operator<=>(const SizeGoal&, const SizeGoal&) = default;
 };
 
 /// The smallest grid found whose PSNR over the box is at least `psnr`. FitOptions::count is the
 /// largest number of ellipsoids; FitOptions::psnr and seconds are ignored.
 struct PsnrGoal {
   double psnr = 0.0;  ///< dB
+  friend auto operator<=>(const PsnrGoal&, const PsnrGoal&) = default;
 };
 
 /// The smallest grid found whose transmittance has at least this PSNR (TransmittancePsnr::psnr50,
@@ -54,6 +60,7 @@ struct PsnrGoal {
 /// PsnrGoal.
 struct PictureGoal {
   double psnr = 0.0;  ///< dB
+  friend auto operator<=>(const PictureGoal&, const PictureGoal&) = default;
 };
 
 /// A grid of voxels that restores every voxel within a bound.
@@ -62,6 +69,7 @@ struct BoundGoal {
   /// `bound` is a share of valueRangeOf() of the volume (metrics.h). The components of a vector have
   /// one range, valueRangeOfVectors(), so that their bound should be given in units of the values.
   bool relative = false;
+  friend auto operator<=>(const BoundGoal&, const BoundGoal&) = default;
 };
 
 /// A grid of voxels whose errors are at most a share of each value: |error| <= share max(|value|, floor). With a
@@ -72,10 +80,13 @@ struct RelativeBoundGoal {
   /// Magnitude below which the bound no longer falls, above 0. Default: the smallest magnitude above 0 of the
   /// active values.
   std::optional<double> floor{};
+  friend auto operator<=>(const RelativeBoundGoal&, const RelativeBoundGoal&) = default;
 };
 
 /// A grid that restores every voxel and the active mask bit for bit. It holds voxels.
-struct LosslessGoal {};
+struct LosslessGoal {
+  friend auto operator<=>(const LosslessGoal&, const LosslessGoal&) = default;
+};
 
 using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, BoundGoal,
                           RelativeBoundGoal, LosslessGoal>;

@@ -210,6 +210,14 @@ class InactiveValues {
 /// For messages: "2 inactive values (5, first at (1, 2, 3))", "9 inactive values (-2.5 to -2, ...)".
 [[nodiscard]] std::string toText(const InactiveValues& values);
 
+/// A grid of numbers with its voxels.
+struct VolumeGrid {
+  GridDescriptor descriptor;
+  SparseVolume volume;
+  std::uint64_t nonFiniteReplaced = 0;  ///< voxels that a reader replaced (NonFinite, vdb_io.h)
+  InactiveValues inactive{};            ///< of the file; the volume does not hold them
+};
+
 // Grids of vectors. A vector grid is read, fitted and stored as three volumes, one for each
 // component.
 

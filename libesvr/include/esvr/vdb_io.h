@@ -82,14 +82,6 @@ struct ReadOptions {
   std::shared_ptr<const vdb::ArchiveDirectory> directory{};
 };
 
-/// A grid with its voxels.
-struct VolumeGrid {
-  GridDescriptor descriptor;
-  SparseVolume volume;
-  std::uint64_t nonFiniteReplaced = 0;  ///< voxels replaced as NonFinite says
-  InactiveValues inactive{};            ///< of the file; the volume does not hold them
-};
-
 /// Reads one grid with its active tiles. Active voxels of the volume hold the grid's values,
 /// rounded to float32. Inactive voxels hold the background and not the file's inactive values, which
 /// VolumeGrid::inactive counts. In a level set they hold the background with the file's sign, which

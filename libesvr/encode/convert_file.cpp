@@ -1,0 +1,558 @@
+// Converts the grids of a file together: vectors get one scale, grids of equal voxels are converted once, a
+// size is divided, small grids are converted at the same time, and vectors that are smaller unchanged are
+// carried. share_grids.cpp then lets voxels refer to those of another grid.
+#include "esvr/convert_file.h"
+
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <atomic>
+#include <future>
+#include <map>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "core/add_seconds.h"
+#include "encode/grids_of_file.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+
+namespace esvr {
+
+// One grid.
+
+namespace encode {
+
+bool GridConverter::isCancelled() const {
+  const CancelToken* const token = CancelScope::orToken(fit_.cancel);
+  return token && token->cancelled();
+}
+
+void GridConverter::step(std::size_t g, const std::function<void()>& run) {
+  fit_.progress = options_.convert.fit.progress;  // that of another step may be gone
+  step({g, true, fit_, run});
+}
+
+void GridConverter::step(const GridStep& step) const {
+  if (options_.onStep)
+    options_.onStep(step);
+  else
+    step.run();
+}
+
+void GridConverter::findScales() {
+  for (std::size_t g = 0; g < grids_.size(); ++g)
+    if (grids_[g].component == std::size_t{0}) step(g, [&] { findScale(g); });
+}
+
+void GridConverter::findScale(std::size_t g) {
+  VectorVolume vectors;
+  if (grids_[g].readVector)
+    vectors = grids_[g].readVector().components;
+  else
+    for (std::size_t c = 0; c < kComponents; ++c) vectors[c] = grids_.at(g + c).read().volume;
+  const VectorScale scale{peakOfVectors(vectors), valueRangeOfVectors(vectors)};
+  for (std::size_t c = 0; c < kComponents; ++c) scales_.at(g + c) = scale;
+}
+
+SourceKey GridConverter::keyOf(std::size_t g, const VolumeGrid& source) const {
+  return {esvr::keyOf({source.descriptor, source.volume}), scales_[g].peak, scales_[g].range,
+          grids_[g].goal};
+}
+
+const Goal& GridConverter::goalOf(std::size_t g) const {
+  return grids_[g].goal ? *grids_[g].goal : options_.convert.goal;
+}
+
+/// The goal of a grid. A bound in % of the range of vectors is the same for all components.
+Goal GridConverter::resolvedGoal(std::size_t g) const {
+  Goal goal = goalOf(g);
+  const auto& range = scales_[g].range;
+  if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && range)
+    *within = {within->bound * *range, false};
+  return goal;
+}
+
+const StoredGrid* GridConverter::previousOf(std::size_t g) const {
+  if (!options_.previous.file) return nullptr;
+  const std::string name = grids_[g].storedName();
+  std::size_t before = 0;
+  for (std::size_t other = 0; other < g; ++other) before += grids_[other].storedName() == name;
+  for (const StoredGrid& grid : options_.previous.file->grids)
+    if (grid.descriptor.name == name && before-- == 0) return &grid;
+  return nullptr;
+}
+
+/// True if the same grid of the previous frame was made from the same source.
+bool GridConverter::isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
+                               const SourceKey& key) const {
+  if (!previous) return false;
+  const auto& [file, keys] = options_.previous;
+  const auto at = std::size_t(previous - file->grids.data());
+  return at < keys.size() && keys[at] == key &&
+         previous->descriptor.valueType == source.descriptor.valueType;
+}
+
+GridConversion GridConverter::make(std::size_t g, const Wish& wish) {
+  GridConversion made;
+  step(g, [&] { made = readAndConvert(g, wish, fit_); });
+  return made;
+}
+
+GridConversion GridConverter::makeBeside(std::size_t g) const {
+  GridConversion made;
+  FitOptions fit = fit_;
+  fit.progress = options_.convert.fit.progress;
+  const std::function<void()> run = [&] { made = readAndConvert(g, {}, fit); };
+  step({g, false, fit, run});
+  return made;
+}
+
+Conversion GridConverter::convertLike(std::size_t g, const VolumeGrid& source,
+                                      const StoredGrid& expected) const {
+  GridConversion made;
+  ConvertOptions options = options_.convert;
+  options.keepsPastErrors = false;  // those of another grid are not worth keeping
+  options.fit = fit_;
+  convert(g, source, {.expected = &expected}, std::move(options), made);
+  return std::move(made.conversion);
+}
+
+GridConversion GridConverter::readAndConvert(std::size_t g, const Wish& wish,
+                                             const FitOptions& fit) const {
+  GridConversion made{.source = g, .convertedAs = g};
+  const VolumeGrid source = addSeconds(made.secondsRead, [&] { return read(g); });
+  made.bricks = source.volume.brickCount();
+  made.nonFiniteReplaced = source.nonFiniteReplaced;
+  made.inactive = source.inactive;
+  made.key = keyOf(g, source);
+  addSeconds(made.secondsConvert, [&] {
+    ConvertOptions options = options_.convert;
+    options.fit = fit;
+    convert(g, source, wish, std::move(options), made);
+  });
+  if (options_.onConverted) options_.onConverted(source, made);
+  return made;
+}
+
+void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
+                            ConvertOptions options, GridConversion& made) const {
+  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
+  if (scales_[g].peak) options.fit.peak = scales_[g].peak;
+  if (grids_[g].component) options.measure = Measure::kValues;
+  const StoredGrid* const previous = previousOf(g);
+  options.previous = wish.expected ? wish.expected : previous;
+  if (!wish.expected && isAsBefore(previous, source, made.key)) {
+    made.asBefore = true;
+    made.conversion.grid = *previous;
+    made.conversion.grid.descriptor = source.descriptor;
+    made.conversion.grid.reference.reset();  // it may name another grid of this file
+  } else if (options_.paper) {
+    PaperConversion byPaper = convertByPaper({source.descriptor, source.volume},
+                                             {options.fit, *options_.paper}, options.storage);
+    made.conversion = std::move(byPaper.conversion);
+    made.paper = std::move(byPaper.record);
+  } else {
+    made.conversion = convertVolume({source.descriptor, source.volume}, options);
+  }
+}
+
+}  // namespace encode
+
+namespace {
+
+using encode::GridConverter;
+
+// Grids of equal voxels.
+
+/// A grid whose conversion is that of an earlier grid, with a descriptor of its own.
+struct Twin {
+  std::size_t of = 0;  ///< the first grid with these voxels
+  GridDescriptor descriptor;
+  std::uint64_t nonFiniteReplaced = 0;
+  InactiveValues inactive{};
+  SourceKey key{};
+  double secondsRead = 0.0;
+};
+
+/// The twins by their index.
+using Twins = std::map<std::size_t, Twin>;
+
+/// True if another grid may have the same voxels.
+bool mayHaveTwin(const std::vector<GridSource>& grids, const GridSource& grid) {
+  return std::ranges::count_if(grids, [&](const GridSource& other) {
+           return grid.activeVoxels == other.activeVoxels && grid.activeBox == other.activeBox;
+         }) > 1;
+}
+
+/// Finds the grids that have the voxels of a grid before them, and the same scale and goal. A key takes few
+/// bytes, so that no volume has to be kept for a comparison.
+Twins findTwins(const std::vector<GridSource>& grids, GridConverter& converter) {
+  std::map<SourceKey, std::size_t> firstBy;
+  Twins twins;
+  for (std::size_t g = 0; g < grids.size() && !converter.isCancelled(); ++g) {
+    if (!mayHaveTwin(grids, grids[g])) continue;
+    VolumeGrid grid;
+    const double seconds = secondsOf([&] { converter.step(g, [&] { grid = converter.read(g); }); });
+    const SourceKey key = converter.keyOf(g, grid);
+    const auto [first, isNew] = firstBy.emplace(key, g);
+    if (!isNew)
+      twins[g] = {
+          first->second, std::move(grid.descriptor), grid.nonFiniteReplaced, grid.inactive, key,
+          seconds};
+  }
+  return twins;
+}
+
+GridConversion twinOf(const GridConversion& grid, std::size_t source, const Twin& twin) {
+  GridConversion made = grid;
+  made.source = source;
+  made.twinOf = grid.source;
+  made.conversion.grid.descriptor = twin.descriptor;
+  made.nonFiniteReplaced = twin.nonFiniteReplaced;
+  made.inactive = twin.inactive;
+  made.key = twin.key;
+  made.secondsRead = twin.secondsRead, made.secondsConvert = 0.0;
+  return made;
+}
+
+// The division of a size.
+
+StoredGrid withDescriptor(StoredGrid grid, const GridDescriptor& descriptor) {
+  grid.descriptor = descriptor;
+  return grid;
+}
+
+/// The bytes that a twin usually adds: its record, and rows for the ellipsoids of one chunk, for
+/// the bricks or the mask, and for the errors of layers. Voxels have fewer rows.
+std::uint64_t usualBytes(const GridDescriptor& twin) {
+  constexpr std::uint64_t kRows = 3;
+  StoredGrid grid;
+  grid.field.chunks.resize(1);
+  return bytesAdded(withDescriptor(std::move(grid), twin)) + kRows * kSectionRowBytes;
+}
+
+/// The bytes of what a file holds besides its converted grids.
+/// \throws UsageError  they leave nothing of `size`
+std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size) {
+  std::vector<StoredVector> vectors;
+  for (std::size_t g = 0; g < source.grids.size(); ++g)
+    if (source.grids[g].component == std::size_t{0}) vectors.push_back({source.grids[g].name, g});
+  const std::uint64_t ofCarried = bytesOfCarried(source.carried);
+  const std::uint64_t bytes =
+      bytesBesideGrids(source.metadata) + ofCarried + bytesOfVectors(vectors);
+  if (bytes < size) return bytes;
+  std::string text = "the file takes " + std::to_string(bytes) + " bytes without any fitted grid";
+  if (ofCarried > 0)
+    text += " (grids that are carried unchanged take " + std::to_string(ofCarried) +
+            " of them; to skip some makes room)";
+  throw UsageError(text + "; the size allows " + std::to_string(size));
+}
+
+/// Subtracts without passing 0.
+std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
+
+/// Divides the wanted size of a file among its grids. Every grid gets the few bytes that the smallest one
+/// takes, and grids share the others by their active voxels. Bytes that a grid does not use go to those that
+/// are converted after it. Twins of a grid have no share; the bytes of their records are reserved.
+class ByteShares {
+ public:
+  ByteShares(const FileSource& source, std::optional<std::uint64_t> size, const Twins& twins)
+      : left_(size), shares_(source.grids.size()) {
+    // A file without grids has nothing to divide, and no option makes it smaller.
+    if (source.grids.empty() && source.carried.empty()) left_.reset();
+    if (!left_) return;
+    *left_ -= bytesBesideConverted(source, *left_);
+    for (std::size_t g = 0; g < shares_.size(); ++g) {
+      if (const auto twin = twins.find(g); twin != twins.end()) {
+        reserve(twin->second);
+        continue;
+      }
+      weightLeft_ += shares_[g].weight = double(source.grids[g].activeVoxels) + 1.0;
+      ++gridsLeft_;
+    }
+    // The record of a grid, its rows in the table, and the codes of a few values. Shares by active
+    // voxels alone would be too small for a grid of a few voxels beside a large one.
+    constexpr std::uint64_t kLeastOfGrid = 512;
+    if (gridsLeft_ > 0) least_ = std::min(kLeastOfGrid, *left_ / gridsLeft_);
+  }
+
+  /// Bytes for a grid without its twins; nothing if no size is wanted.
+  [[nodiscard]] std::optional<std::uint64_t> of(std::size_t grid) const {
+    if (!left_) return std::nullopt;
+    const std::uint64_t divided = less(*left_, least_ * gridsLeft_);
+    const std::uint64_t least = std::min(least_, *left_ / gridsLeft_);
+    return least + std::uint64_t(double(divided) * shares_[grid].weight / weightLeft_);
+  }
+
+  /// Subtracts the bytes of a converted grid and of its twins.
+  /// \param previous  the same grid of the previous frame, from which it is predicted; null: none
+  /// \return the bytes by which they exceed their share; if there are any, nothing is subtracted
+  [[nodiscard]] std::uint64_t take(std::size_t grid, const StoredGrid& stored,
+                                   const StoredGrid* previous) {
+    if (!left_) return 0;
+    const Share& share = shares_[grid];
+    const std::uint64_t bytes = bytesOf(share, stored, previous),
+                        allowed = *of(grid) + share.reserved;
+    if (bytes > allowed) return bytes - allowed;
+    left_ = less(*left_ + share.reserved, bytes);
+    weightLeft_ -= share.weight;
+    --gridsLeft_;
+    return 0;
+  }
+
+ private:
+  /// A grid that is not a twin.
+  struct Share {
+    double weight = 0.0;
+    std::vector<GridDescriptor> twins;
+    std::uint64_t reserved = 0;  ///< expected bytes of the twins
+  };
+
+  void reserve(const Twin& twin) {
+    Share& share = shares_[twin.of];
+    const std::uint64_t bytes = usualBytes(twin.descriptor);
+    share.twins.push_back(twin.descriptor);
+    share.reserved += bytes;
+    left_ = less(*left_, bytes);
+  }
+
+  /// Bytes of a converted grid with its twins.
+  [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored,
+                                             const StoredGrid* previous) {
+    const std::uint64_t bytes = bytesInFrame(stored, previous);
+    if (share.twins.empty()) return bytes;
+    std::vector<StoredGrid> all{stored};
+    for (const auto& descriptor : share.twins) all.push_back(withDescriptor(stored, descriptor));
+    return bytes + bytesAddedTogether(std::move(all)) - bytesAdded(stored);
+  }
+
+  std::optional<std::uint64_t> left_;  ///< bytes without those reserved
+  double weightLeft_ = 0.0;
+  std::uint64_t gridsLeft_ = 0;  ///< that have no bytes yet
+  std::uint64_t least_ = 0;      ///< bytes that every grid gets
+  std::vector<Share> shares_;    ///< one for each grid; that of a twin is not used
+};
+
+// Every grid of a file.
+
+/// Calls body(i) for the numbers below `count` on several threads, which begin in their order. None begins
+/// after the token is set or one has thrown; the first exception is thrown again.
+void forEachAtOnce(std::size_t count, int threads, const std::function<void(std::size_t)>& body) {
+  std::atomic<std::size_t> next{0};
+  const CancelToken* const token = CancelScope::token();
+  const auto work = [&] {
+    const CancelScope scope(token);
+    try {
+      for (std::size_t i; !CancelScope::cancelled() && (i = next++) < count;) body(i);
+    } catch (...) {
+      next = count;
+      throw;
+    }
+  };
+  std::vector<std::future<void>> others;
+  for (int t = 1; t < threads; ++t) others.push_back(std::async(std::launch::async, work));
+  auto own = std::async(std::launch::deferred, work);
+  own.wait();
+  for (auto& other : others) other.wait();
+  own.get();
+  for (auto& other : others) other.get();
+}
+
+/// Converts the grids until all are done or the call is cancelled: small ones at the same time, and then one
+/// after the other.
+class GridsConversion {
+ public:
+  GridsConversion(const FileSource& source, const FileOptions& options, GridConverter& converter)
+      : source_(source), options_(options), converter_(converter), made_(source.grids.size()) {}
+
+  /// \return a conversion for each grid, or nothing for those that were not converted
+  std::vector<std::optional<GridConversion>> run() {
+    converter_.findScales();
+    twins_ = findTwins(source_.grids, converter_);
+    ByteShares shares(source_, options_.size, twins_);
+    convertSmall();
+    for (const std::size_t g : order())
+      if (!made_[g] && !twins_.contains(g) && !converter_.isCancelled()) convert(g, shares);
+    for (const auto& [g, twin] : twins_)
+      if (made_[twin.of]) made_[g] = twinOf(*made_[twin.of], g, twin);
+    return std::move(made_);
+  }
+
+ private:
+  /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
+  /// keeps few threads and little of a GPU busy.
+  void convertSmall() {
+    constexpr std::uint64_t kMostActive = std::uint64_t{1} << 19;
+    constexpr std::size_t kAtOnce = 4;  // as many frames of a sequence use a GPU
+    // A single fit takes the time that was asked for, and shows its progress.
+    const ConvertOptions& convert = options_.convert;
+    if (convert.fit.seconds || std::holds_alternative<FitGoal>(convert.goal)) return;
+    if (options_.size || !options_.severalAtOnce || source_.grids.size() < 2) return;
+    std::vector<std::size_t> small;
+    for (std::size_t g = 0; g < made_.size(); ++g)
+      if (!twins_.contains(g) && source_.grids[g].activeVoxels <= kMostActive) small.push_back(g);
+    using Limit = tbb::global_control;
+    const std::size_t threads = Limit::active_value(Limit::max_allowed_parallelism);
+    forEachAtOnce(
+        small.size(), int(std::min({kAtOnce, threads, small.size()})), [&](std::size_t i) {
+          try {
+            made_[small[i]] = converter_.makeBeside(small[i]);
+          } catch (
+              const DeviceError&) {  // it is converted again where another device can take over
+          } catch (const Cancelled&) {
+          }
+        });
+  }
+
+  /// The order in which grids are converted. Those that share a size begin with the one that takes the fewest
+  /// bytes for its voxels in the source, since it probably leaves most of its share to the others.
+  [[nodiscard]] std::vector<std::size_t> order() const {
+    std::vector<std::size_t> order(source_.grids.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto bytesEach = [&](std::size_t g) {
+      const GridSource& grid = source_.grids[g];
+      return double(grid.storedBytes) / double(grid.activeVoxels + 1);
+    };
+    if (options_.size) std::ranges::stable_sort(order, {}, bytesEach);
+    return order;
+  }
+
+  /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for
+  /// every section. How many there are is known after a conversion only; where they exceed what is
+  /// reserved for the twins, the grid is converted again to fewer bytes.
+  void convert(std::size_t g, ByteShares& shares) try {
+    std::optional<std::uint64_t> bytes = shares.of(g);
+    GridConversion grid = converter_.make(g, {.bytes = bytes});
+    const auto excessOf = [&]() -> std::uint64_t {
+      const BestSoFar completion;
+      // No grid follows an interrupted one.
+      return converter_.isCancelled()
+                 ? 0
+                 : shares.take(g, grid.conversion.grid, converter_.previousOf(g));
+    };
+    while (const std::uint64_t excess = excessOf()) {
+      bytes = less(*bytes, excess);
+      grid = converter_.make(g, {.bytes = bytes});
+    }
+    made_[g] = std::move(grid);
+  } catch (const Cancelled&) {  // before it had a result
+  }
+
+  const FileSource& source_;
+  const FileOptions& options_;
+  GridConverter& converter_;
+  Twins twins_;
+  std::vector<std::optional<GridConversion>> made_;
+};
+
+// Vectors, and the file.
+
+/// The grids that were converted. Vectors lack no component.
+std::vector<GridConversion> completeOnes(const std::vector<GridSource>& grids,
+                                         std::vector<std::optional<GridConversion>> made) {
+  std::vector<GridConversion> complete;
+  for (std::size_t g = 0; g < grids.size(); ++g) {
+    const std::size_t first = g - grids[g].component.value_or(0);
+    const std::size_t count = grids[g].component ? kComponents : 1;
+    const auto all = std::span(made).subspan(first, count);
+    if (std::ranges::all_of(all, [](const auto& grid) { return grid.has_value(); }))
+      complete.push_back(*made[g]);
+  }
+  return complete;
+}
+
+/// A grid whose other twin is not there stands alone.
+void forgetMissingTwins(std::vector<GridConversion>& grids) {
+  for (GridConversion& grid : grids)
+    if (grid.twinOf && std::ranges::count(grids, *grid.twinOf, &GridConversion::source) == 0)
+      grid.twinOf.reset();
+}
+
+std::vector<StoredVector> vectorsOf(const std::vector<GridSource>& sources,
+                                    const std::vector<GridConversion>& grids) {
+  std::vector<StoredVector> vectors;
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    if (const GridSource& source = sources[grids[g].source]; source.component == std::size_t{0})
+      vectors.push_back({source.name, g});
+  return vectors;
+}
+
+/// Bytes that a vector adds to a file.
+std::uint64_t bytesOfVector(const std::vector<GridConversion>& grids, const StoredVector& vector) {
+  std::vector<StoredGrid> components;
+  for (std::size_t c = 0; c < kComponents; ++c)
+    components.push_back(grids[vector.first + c].conversion.grid);
+  return bytesAddedTogether(std::move(components)) + bytesOfVectors({vector});
+}
+
+/// Carries the vectors that take fewer bytes unchanged than as converted components, unless an option
+/// prescribes the representation or a size.
+void carrySmallerVectors(const FileOptions& options, FileSource& source, ConvertedFile& made) {
+  if (options.convert.representation != Representation::kAuto ||
+      options.convert.storage.form != Storage::kCompact || options.size)
+    return;
+  for (const StoredVector& vector : vectorsOf(source.grids, made.grids)) {
+    const GridSource& grid = source.grids[made.grids[vector.first].source];
+    if (!grid.readCarried) continue;
+    std::vector<CarriedGrid> unchanged{grid.readCarried()};
+    const std::uint64_t bytes = bytesOfVector(made.grids, vector);
+    if (bytesOfCarried(unchanged) >= bytes) continue;
+    made.carriedVectors.push_back({grid.place, bytes});
+    const auto at = std::ranges::lower_bound(source.carried, grid.place, {}, &CarriedGrid::place);
+    unchanged.front().place = std::uint32_t(grid.place);
+    source.carried.insert(at, std::move(unchanged.front()));
+  }
+  std::erase_if(made.grids, [&](const GridConversion& grid) {
+    return std::ranges::count(made.carriedVectors, source.grids[grid.source].place,
+                              &CarriedVector::place) > 0;
+  });
+}
+
+/// Gives the carried grids their places among those that the file holds.
+void placeCarried(const std::vector<GridSource>& sources, const std::vector<GridConversion>& grids,
+                  std::vector<CarriedGrid>& carried) {
+  std::size_t converted = 0;
+  for (std::size_t c = 0; c < carried.size(); ++c) {
+    while (converted < grids.size() && sources[grids[converted].source].place < carried[c].place)
+      ++converted;
+    carried[c].place = std::uint32_t(converted + c);
+  }
+}
+
+void assemble(FileSource& source, ConvertedFile& made) {
+  placeCarried(source.grids, made.grids, source.carried);
+  EsvrFile& file = made.file;
+  file.metadata = std::move(source.metadata);
+  file.carried = std::move(source.carried);
+  for (const GridConversion& grid : made.grids) file.grids.push_back(grid.conversion.grid);
+  file.vectors = vectorsOf(source.grids, made.grids);
+  if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
+}
+
+}  // namespace
+
+std::string GridSource::storedName() const {
+  return component ? componentName(name, *component) : name;
+}
+
+ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
+  const CancelScope scope(CancelScope::orToken(options.convert.fit.cancel));
+  GridConverter converter(source.grids, options);
+  ConvertedFile made;
+  made.grids = completeOnes(source.grids, GridsConversion(source, options, converter).run());
+  made.interrupted = converter.isCancelled();
+  {
+    const Completion completion;
+    if (!made.interrupted) carrySmallerVectors(options, source, made);
+    forgetMissingTwins(made.grids);
+    assemble(source, made);
+  }
+  encode::shareGrids(options, converter, made);
+  return made;
+}
+
+}  // namespace esvr

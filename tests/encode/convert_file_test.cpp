@@ -1,0 +1,371 @@
+// Plan: grids with the same voxels, the same scale and the same goal are converted once, and those that
+// differ in a voxel, in their class or in their goal apart. A size is kept to and nearly used up, also by grids with
+// twins and by files of one large and one tiny grid. Voxels that follow from those of another grid take fewer
+// bytes, at the quality that was asked for. Vectors have one scale, are carried where that is smaller, and are never left
+// incomplete. Steps may be run again, and grids at the same time and one after the other give the same file.
+
+#include "esvr/convert_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <set>
+
+#include "encode/volumes.h"
+#include "esvr/error.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+#include "support/temporary_folder.h"
+
+namespace esvr {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+constexpr double kStandardPsnr = 40.0;
+
+/// A soft ball with values from 0 to `peak`.
+SparseVolume softBall(Coord center, float peak, double radius = 10.0) {
+  return test::volumeOf({}, 5, 0.0f, [&](Coord v) {
+    const double r =
+        std::hypot(v.x - center.x - 18.0, v.y - center.y - 17.0, v.z - center.z - 19.0);
+    return float(std::max(1.0 - r / radius, 0.0)) * peak;
+  });
+}
+
+/// A source that returns this volume whenever it is read.
+GridSource sourceOf(const std::string& name, const SparseVolume& volume, std::size_t place,
+                    GridClass gridClass = GridClass::kFogVolume) {
+  VolumeGrid grid;
+  grid.descriptor.name = name;
+  grid.descriptor.gridClass = gridClass;
+  grid.descriptor.background = volume.background;
+  grid.descriptor.transform = uniformTransform(0.5);
+  grid.volume = volume;
+  return {.name = name,
+          .place = place,
+          .activeVoxels = activeVoxelCount(volume),
+          .storedBytes = activeVoxelCount(volume) * 4,
+          .activeBox = activeBox(volume),
+          .read = [grid] { return grid; }};
+}
+
+FileSource fileOf(const std::vector<std::pair<std::string, SparseVolume>>& volumes) {
+  FileSource file;
+  for (const auto& [name, volume] : volumes)
+    file.grids.push_back(sourceOf(name, volume, file.grids.size()));
+  return file;
+}
+
+/// Components of vectors with these values.
+void addVectors(const std::string& name, const VectorVolume& components, FileSource& file) {
+  const std::size_t place = file.grids.empty() ? 0 : file.grids.back().place + 1;
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    GridSource source = sourceOf(componentName(name, c), components[c], place);
+    source.name = name;
+    source.component = c;
+    file.grids.push_back(std::move(source));
+  }
+}
+
+FileOptions fileOptions(const Goal& goal, Representation representation = Representation::kVoxels) {
+  FileOptions options;
+  options.convert.goal = goal;
+  options.convert.representation = representation;
+  options.convert.measure = Measure::kValues;
+  options.convert.fit.iterations = 60;
+  return options;
+}
+
+FileOptions sizedOptions(std::uint64_t bytes) {
+  FileOptions options = fileOptions(PresetGoal{}, Representation::kEllipsoids);
+  options.size = bytes;
+  return options;
+}
+
+double activePsnrOf(const SparseVolume& volume, const StoredGrid& grid) {
+  return compareVolumes(volume, decodeGrid(grid)).psnrActive;
+}
+
+/// The grid that each of the grids is a twin of.
+std::vector<std::optional<std::size_t>> twinsIn(const FileSource& file,
+                                                const FileOptions& options) {
+  std::vector<std::optional<std::size_t>> twins;
+  for (const GridConversion& grid : convertGrids(file, options).grids) twins.push_back(grid.twinOf);
+  return twins;
+}
+
+TEST(ConvertGrids, ConvertsEqualVoxelsOnceAndKeepsTheirDescriptors) {
+  const SparseVolume ball = softBall({}, 1.0f);
+  const FileSource file = fileOf({{"red", ball}, {"heat", softBall({}, 2.0f)}, {"green", ball}});
+  std::atomic<int> conversions = 0;
+  FileOptions options = fileOptions(LosslessGoal{});
+  options.onConverted = [&](const VolumeGrid&, const GridConversion&) { ++conversions; };
+  const ConvertedFile made = convertGrids(file, options);
+  ASSERT_THAT(made.file.grids, SizeIs(3));
+  EXPECT_EQ(conversions, 2);
+  EXPECT_EQ(made.grids[2].twinOf, std::size_t{0});
+  EXPECT_EQ(made.file.grids[2].descriptor.name, "green");
+  EXPECT_EQ(decodeGrid(made.file.grids[2]).values, ball.values);
+}
+
+TEST(ConvertGrids, ConvertsGridsApartThatDifferInAVoxelInTheirClassOrInTheirGoal) {
+  const SparseVolume ball = softBall({}, 1.0f), band = test::levelSetVolume();
+  SparseVolume other = ball;
+  for (float& value : other.values)
+    if (value > 0.9f) value += 1e-6f;
+  FileSource file = fileOf({{"a", ball}, {"b", other}, {"c", band}, {"e", ball}, {"f", ball}});
+  file.grids.push_back(sourceOf("d", band, 5, GridClass::kLevelSet));
+  file.grids[3].goal = PsnrGoal{30.0};
+  EXPECT_THAT(twinsIn(file, fileOptions(PsnrGoal{kStandardPsnr})),
+              ElementsAre(std::nullopt, std::nullopt, std::nullopt, std::nullopt, std::size_t{0},
+                          std::nullopt));
+}
+
+TEST(ConvertGrids, LetsVoxelsReferToThoseOfAnotherGrid) {
+  const SparseVolume density = softBall({}, 1.0f), heat = softBall({}, 40.0f);
+  const FileSource file =
+      fileOf({{"density", density}, {"heat", heat}, {"far", softBall({6, 1, 0}, 2.0f, 5.0)}});
+  FileOptions options = fileOptions(PresetGoal{});
+  const ConvertedFile together = convertGrids(file, options);
+  options.shares = false;
+  const ConvertedFile apart = convertGrids(file, options);
+  ASSERT_TRUE(together.grids[1].shared);
+  EXPECT_EQ(together.grids[1].shared->with, std::size_t{0});
+  const auto bytes = encodeEsvr(together.file).size(), bytesApart = encodeEsvr(apart.file).size();
+  EXPECT_LT(3 * bytes, 2 * bytesApart);
+  EXPECT_GE(activePsnrOf(heat, together.file.grids[1]), kStandardPsnr);
+  // The padding of the last section is counted.
+  const std::uint64_t figure =
+      bytesWithoutSharing(together, inspectEsvr(encodeEsvr(together.file), "file"));
+  EXPECT_GE(figure, bytesApart);
+  EXPECT_LT(figure, bytesApart + 8);
+}
+
+TEST(ConvertGrids, KeepsTheGoalsOfSingleGridsWhileTheyShare) {
+  const SparseVolume density = softBall({}, 1.0f), heat = softBall({}, 40.0f);
+  FileSource file = fileOf({{"density", density}, {"heat", heat}});
+  file.grids[0].goal = BoundGoal{.bound = 0.02};
+  file.grids[1].goal = PsnrGoal{50.0};
+  const ConvertedFile made = convertGrids(file, fileOptions(PresetGoal{}));
+  EXPECT_LE(compareVolumes(density, decodeGrid(made.file.grids[0])).maxError, 0.02f);
+  EXPECT_GE(compareVolumes(heat, decodeGrid(made.file.grids[1])).psnrBox, 50.0);
+}
+
+// A size.
+
+TEST(ConvertGridsToSize, KeepsToItWithAGridOfAFewVoxels) {
+  constexpr std::uint64_t kSize = 3000;
+  const FileSource file =
+      fileOf({{"large", test::smoothVolume()}, {"tiny", softBall({}, 1.0f, 3.0)}});
+  const std::uint64_t bytes = encodeEsvr(convertGrids(file, sizedOptions(kSize)).file).size();
+  EXPECT_LE(bytes, kSize);
+  EXPECT_GE(double(bytes), 0.95 * double(kSize));
+}
+
+/// Each ball is in a chunk of its own, and a twin has a row of the table for each of them. That is more than
+/// is reserved for a twin before the number of chunks is known.
+TEST(ConvertGridsToSize, KeepsToItWhereTwinsHaveManySections) {
+  constexpr std::uint64_t kSize = 5000;
+  std::vector<BrickInput> bricks;
+  for (int i = 0; i < 8; ++i) {
+    const SparseVolume ball = softBall({}, 1.0f, 6.0);
+    for (std::size_t b = 0; b < ball.brickCount(); ++b) {
+      BrickInput brick{ball.brickCorner(b) + Coord{4096 * i, 0, 0}, {}, ball.active[b]};
+      std::ranges::copy(ball.brickValues(b), brick.values.begin());
+      if (brick.active.count() > 0) bricks.push_back(brick);
+    }
+  }
+  const SparseVolume balls = makeVolume(std::move(bricks), 0.0f);
+  const ConvertedFile made =
+      convertGrids(fileOf({{"red", balls}, {"green", balls}}), sizedOptions(kSize));
+  EXPECT_EQ(made.grids[1].twinOf, std::size_t{0});
+  const std::uint64_t bytes = encodeEsvr(made.file).size();
+  EXPECT_LE(bytes, kSize);
+  EXPECT_GE(double(bytes), 0.9 * double(kSize));
+}
+
+TEST(ConvertGridsToSize, RefusesWhatLeavesNothingForTheGrids) {
+  FileSource file = fileOf({{"density", softBall({}, 1.0f)}});
+  std::string note;
+  for (unsigned i = 0; i < 2000; ++i) note += char('!' + (i * 2654435761u >> 20) % 90);
+  file.metadata = {stringItem("note", note)};
+  try {
+    (void)convertGrids(file, sizedOptions(1000));
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("without any fitted grid; the size allows 1000"));
+  }
+}
+
+TEST(ConvertGridsToSize, GivesTheBytesThatTwinsDoNotTakeToTheOthers) {
+  constexpr std::uint64_t kSize = 4000, kBytesOfATwin = 600;
+  const SparseVolume cloud = test::smoothVolume();
+  SparseVolume last = cloud;
+  for (float& value : last.values) value *= 3.0f;
+  const auto ellipsoids = [](const ConvertedFile& made) {
+    std::size_t sum = 0;
+    for (const GridConversion& grid : made.grids)
+      if (!grid.twinOf) sum += grid.conversion.grid.field.ellipsoidCount();
+    return sum;
+  };
+  const auto alone = convertGrids(fileOf({{"red", cloud}, {"last", last}}), sizedOptions(kSize));
+  const std::uint64_t size = kSize + 2 * kBytesOfATwin;
+  const auto withTwins =
+      convertGrids(fileOf({{"red", cloud}, {"green", cloud}, {"blue", cloud}, {"last", last}}),
+                   sizedOptions(size));
+  EXPECT_GE(ellipsoids(withTwins), ellipsoids(alone));
+  EXPECT_LE(encodeEsvr(withTwins.file).size(), size);
+}
+
+// Vectors.
+
+VectorVolume wind() { return {softBall({}, 1.0f), softBall({}, -3.0f), softBall({}, 0.5f)}; }
+
+TEST(ConvertGrids, GivesTheComponentsOfVectorsOneScale) {
+  FileSource file = fileOf({{"density", softBall({}, 1.0f)}});
+  const VectorVolume vectors = wind();
+  addVectors("wind", vectors, file);
+  FileOptions options = fileOptions(BoundGoal{.bound = 0.01, .relative = true});
+  const ConvertedFile made = convertGrids(file, options);
+  EXPECT_EQ(made.file.vectors, (std::vector<StoredVector>{{"wind", 1}}));
+  const double bound = 0.01 * valueRangeOfVectors(vectors);
+  double worst = 0.0;
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    EXPECT_EQ(made.grids[1 + c].key.peak, peakOfVectors(vectors));
+    const double error = compareVolumes(vectors[c], decodeGrid(made.file.grids[1 + c])).maxError;
+    EXPECT_LE(error, bound);
+    worst = std::max(worst, error);
+  }
+  EXPECT_GT(worst, 0.5 * bound);  // that of the smallest component alone would be a sixth of it
+}
+
+TEST(ConvertGrids, CarriesEachVectorThatIsSmallerUnchanged) {
+  FileSource file = fileOf({});
+  for (const char* name : {"small", "large", "tiny"}) addVectors(name, wind(), file);
+  std::size_t bytes = 100;
+  for (std::size_t g = 0; g < file.grids.size(); g += kComponents, bytes += 1'000'000) {
+    CarriedGrid carried;
+    carried.name = file.grids[g].name;
+    carried.treeType = "Tree_vec3s_5_4_3";
+    carried.vdbVersion = 224;
+    carried.bytes.resize(g == 3 ? 1'000'000 : 100);
+    for (std::size_t i = 0; i < carried.bytes.size(); ++i)
+      carried.bytes[i] = std::byte((i * 2654435761u) >> 13);
+    file.grids[g].readCarried = [carried] { return carried; };
+  }
+  const ConvertedFile made = convertGrids(file, fileOptions(PsnrGoal{60.0}, Representation::kAuto));
+  EXPECT_EQ(made.file.vectors, (std::vector<StoredVector>{{"large", 0}}));
+  EXPECT_THAT(namesInOrder(made.file), ElementsAre("small", "large", "tiny"));
+  EXPECT_THAT(made.carriedVectors, SizeIs(2));
+  for (const GridConversion& grid : made.grids) EXPECT_FALSE(grid.twinOf);  // of what is not there
+  (void)decodeEsvr(encodeEsvr(made.file), "file");
+}
+
+TEST(ConvertGrids, LeavesOutIncompleteVectorsWhenItIsCancelled) {
+  FileSource file = fileOf({{"density", softBall({}, 1.0f)}});
+  addVectors("wind", wind(), file);
+  FileOptions options = fileOptions(PresetGoal{});
+  options.severalAtOnce = false;
+  CancelToken token;
+  options.convert.fit.cancel = &token;
+  options.onConverted = [&](const VolumeGrid& grid, const GridConversion&) {
+    if (grid.descriptor.name == "wind.y") token.cancel();
+  };
+  const ConvertedFile made = convertGrids(file, options);
+  EXPECT_TRUE(made.interrupted);
+  EXPECT_THAT(made.file.grids, SizeIs(1));
+  EXPECT_TRUE(made.file.vectors.empty());
+}
+
+// Steps, and frames.
+
+TEST(ConvertGrids, RunsAStepAgainOnAnotherDevice) {
+  FileOptions options = fileOptions(PresetGoal{});
+  options.severalAtOnce = false;
+  std::set<std::size_t> failed;
+  options.onStep = [&](const GridStep& step) {
+    try {
+      if (failed.insert(step.grid).second) throw DeviceError("lost");
+    } catch (const DeviceError&) {
+      step.fit.device = Device{};
+    }
+    step.run();
+  };
+  const FileSource file =
+      fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({5, 0, 0}, 1.0f, 4.0)}});
+  const ConvertedFile made = convertGrids(file, options);
+  EXPECT_THAT(made.file.grids, SizeIs(2));
+  EXPECT_THAT(failed, SizeIs(2));
+}
+
+TEST(ConvertGrids, ThrowsWhatAStepThrowsAtTheSameTimeAsOthers) {
+  FileOptions options = fileOptions(PresetGoal{});
+  options.onStep = [](const GridStep& step) {
+    if (step.grid == 1) throw BadInput("the second");
+    step.run();
+  };
+  const FileSource file =
+      fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({5, 0, 0}, 1.0f, 4.0)}});
+  EXPECT_THROW((void)convertGrids(file, options), BadInput);
+}
+
+TEST(ConvertGrids, GivesTheSameFileAtTheSameTimeAndOneAfterTheOther) {
+  FileSource file = fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({5, 0, 0}, 1.0f, 4.0)}});
+  addVectors("wind", wind(), file);
+  FileOptions options = fileOptions(PresetGoal{}, Representation::kAuto);
+  const auto together = encodeEsvr(convertGrids(file, options).file);
+  options.severalAtOnce = false;
+  EXPECT_EQ(together, encodeEsvr(convertGrids(file, options).file));
+}
+
+TEST(ConvertGrids, KeepsTheGridsOfTheFrameBeforeWhereNothingMoves) {
+  const FileSource still =
+      fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({5, 0, 0}, 1.0f, 4.0)}});
+  FileOptions options = fileOptions(PresetGoal{});
+  const ConvertedFile first = convertGrids(still, options);
+  std::vector<SourceKey> keys;
+  for (const GridConversion& grid : first.grids) keys.push_back(grid.key);
+  options.previous = {&first.file, keys};
+  const FileSource moved =
+      fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({6, 0, 0}, 1.0f, 4.0)}});
+  const ConvertedFile second = convertGrids(moved, options);
+  EXPECT_TRUE(second.grids[0].asBefore);
+  EXPECT_FALSE(second.grids[1].asBefore);
+  EXPECT_EQ(second.file.grids[0].voxels, first.file.grids[0].voxels);
+}
+
+// Sources.
+
+TEST(ReadSources, ReadGridsAndCarriesWhatCannotBeConverted) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "in.vdb";
+  VolumeGrid density = sourceOf("density", softBall({}, 1.0f), 0).read(), exact = density;
+  exact.descriptor.name = "exact";
+  exact.descriptor.valueType = ValueType::kDouble;
+  const PackedGrid count = [&] {
+    PackedVoxels<std::int32_t> voxels;
+    voxels.bricks = {{.corner = {}, .active = {}, .part = 0, .first = 0}};
+    voxels.bricks[0].active.set(3);
+    voxels.parts = {{7}};
+    PackedGrid grid{density.descriptor, voxels};
+    grid.descriptor.name = "count";
+    return grid;
+  }();
+  writeGrids(path, {}, std::vector<GridToWrite>{&density, &count, &exact});
+  const FileSource lossy = readSources(path), lossless = readSources(path, true);
+  ASSERT_THAT(lossy.grids, SizeIs(2));
+  EXPECT_THAT(lossy.carried, SizeIs(1));
+  EXPECT_THAT(lossless.grids, SizeIs(1));
+  EXPECT_THAT(lossless.carried, SizeIs(2));
+  EXPECT_EQ(lossy.grids[0].read().volume.values, density.volume.values);
+  const ConvertedFile made = convertGrids(lossy, fileOptions(PresetGoal{}));
+  EXPECT_THAT(namesInOrder(made.file), ElementsAre("density", "count", "exact"));
+}
+
+}  // namespace
+}  // namespace esvr
