@@ -1,8 +1,13 @@
 #include "programs/splat_input.h"
 
+#include <cerrno>
+#include <cstdlib>
 #include <limits>
 #include <string>
+#include <system_error>
+#include <vector>
 
+#include "core/atomic_file.h"
 #include "programs/option_values.h"
 
 namespace esvr::cli {
@@ -69,6 +74,28 @@ SplatGrids readSplatGrids(const std::filesystem::path& path, const SplatInput& i
     log.detail(std::to_string(grids.thickened) + " splats are thinner than voxels, and were made " +
                shortNumber(kThinnest) + " voxels thick");
   return grids;
+}
+
+SplatsAsVdb::SplatsAsVdb(const Source& source, const Log& log) {
+  const SplatGrids grids = readSplatGrids(source.path, source.input, source.memory, log);
+  std::string folder = (source.scratch / "esvr-splats-XXXXXX").string();
+  if (!::mkdtemp(folder.data())) failAt("cannot write a file in ", source.scratch, errno);
+  folder_ = folder;
+  path_ = folder_ / source.path.filename().replace_extension(".vdb");
+  std::vector<GridToWrite> written{&grids.density};
+  if (grids.color) written.emplace_back(&*grids.color);
+  try {
+    writeGrids(path_, {}, written);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+    throw;
+  }
+}
+
+SplatsAsVdb::~SplatsAsVdb() {
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
 }
 
 }  // namespace esvr::cli

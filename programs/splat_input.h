@@ -32,4 +32,26 @@ void addSplatInput(po::options_description& options);
 [[nodiscard]] SplatGrids readSplatGrids(const std::filesystem::path& path, const SplatInput& input,
                                         const HostMemory& memory, const Log& log);
 
+/// The grids of splats as a .vdb file for programs that read such files. It is in a folder of its own, which is
+/// removed with this object.
+class SplatsAsVdb {
+ public:
+  struct Source {
+    std::filesystem::path path, scratch;  ///< file of splats, and where the folder is made
+    SplatInput input;
+    HostMemory memory;
+  };
+  /// \throws BadInput, MemoryExceeded  as for readSplatGrids
+  /// \throws RuntimeFailure  the file cannot be written
+  SplatsAsVdb(const Source& source, const Log& log);
+  ~SplatsAsVdb();
+  SplatsAsVdb(const SplatsAsVdb&) = delete;
+  SplatsAsVdb& operator=(const SplatsAsVdb&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path folder_, path_;
+};
+
 }  // namespace esvr::cli

@@ -41,8 +41,10 @@ Kernel gaussianKernel() {
 }
 
 double gaussianVolume() {
-  const Kernel kernel = gaussianKernel();
-  return 2.0 * std::numbers::sqrt2 * gaussianOf(kernel, double(kernel.kappa)).volume;
+  const double cut = double(gaussianKernel().epsilon), radius = std::sqrt(-std::log(cut));
+  const double whole = std::pow(kPi, 1.5) * std::erf(radius) - 2.0 * kPi * radius * cut;
+  const double base = 4.0 / 3.0 * kPi * radius * radius * radius * cut;
+  return 2.0 * std::numbers::sqrt2 * (whole - base) / (1.0 - cut);
 }
 
 double meanShadow(Sizes halfAxes) {

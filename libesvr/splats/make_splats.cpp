@@ -51,36 +51,51 @@ void requireEllipsoids(const StoredGrid& grid) {
 
 // The Gaussians of a density, in index space.
 
-/// The ellipsoids of a positive intensity as Gaussians with their integrals and second moments.
-Field gaussiansOf(const Field& field) {
-  Field gaussians;
-  gaussians.kernel = gaussianKernel();
-  const double ofGaussian = gaussianVolume();
-  const KernelGaussian common = gaussianOf(field.kernel, double(field.kernel.kappa));
+/// The ellipsoids of a positive intensity, since no splat takes away from others.
+Field positiveOf(const Field& field) {
+  Field positive;
+  positive.kernel = field.kernel;
   for (const Chunk& chunk : field.chunks) {
     const Ellipsoids& from = chunk.ellipsoids;
     Chunk made{chunk.origin, {}};
     Ellipsoids& to = made.ellipsoids;
     for (std::size_t i = 0; i < from.size(); ++i) {
       if (!(from.intensity[i] > 0.0f)) continue;
-      const auto [width, volume] =
-          from.kappa.empty() ? common : gaussianOf(field.kernel, double(from.kappa[i]));
-      const double wider =
-          std::log(width * std::numbers::sqrt2);  // exp(-m) has the deviation 1 / sqrt(2)
-      for (int a = 0; a < 3; ++a) {
+      for (std::size_t a = 0; a < 3; ++a) {
         to.center[a].push_back(from.center[a][i]);
-        to.logScale[a].push_back(float(double(from.logScale[a][i]) + wider));
+        to.logScale[a].push_back(from.logScale[a][i]);
       }
-      for (int a = 0; a < 4; ++a) to.rotation[a].push_back(from.rotation[a][i]);
-      to.intensity.push_back(
-          float(double(from.intensity[i]) * volume / (ofGaussian * width * width * width)));
+      for (std::size_t a = 0; a < 4; ++a) to.rotation[a].push_back(from.rotation[a][i]);
+      to.intensity.push_back(from.intensity[i]);
+      if (!from.kappa.empty()) to.kappa.push_back(from.kappa[i]);
     }
-    gaussians.chunks.push_back(std::move(made));
+    positive.chunks.push_back(std::move(made));
   }
-  return gaussians;
+  return positive;
 }
 
-/// One Gaussian of a field in float64.
+/// Makes ellipsoids Gaussians with their integrals and second moments.
+void becomeGaussians(Field& field) {
+  const double ofGaussian = gaussianVolume();
+  const KernelGaussian common = gaussianOf(field.kernel, double(field.kernel.kappa));
+  for (Chunk& chunk : field.chunks) {
+    Ellipsoids& e = chunk.ellipsoids;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      const auto [width, volume] =
+          e.kappa.empty() ? common : gaussianOf(field.kernel, double(e.kappa[i]));
+      // exp(-m) has a standard deviation of 1 / sqrt(2).
+      const double wider = std::log(width * std::numbers::sqrt2);
+      for (auto& scale : e.logScale) scale[i] = float(double(scale[i]) + wider);
+      e.intensity[i] =
+          float(double(e.intensity[i]) * volume / (ofGaussian * width * width * width));
+    }
+    e.kappa.clear();
+  }
+  field.kernel = gaussianKernel();
+}
+
+/// One ellipsoid of a field in float64. The columns are the standard deviations of a Gaussian, and about those
+/// of other kernels.
 struct Gaussian {
   std::array<double, 3> center;
   Matrix3 columns;  ///< the axes times the standard deviations
@@ -99,17 +114,26 @@ struct Gaussian {
   }
 };
 
-/// Places at which a Gaussian is compared with the density: means over them are means over the Gaussian, exact
-/// for polynomials of degree 3, because they are sqrt(3) standard deviations from the center along the axes.
-constexpr int kSamples = 6;
+/// Places at which an ellipsoid is compared with the density, with weights whose sums are means over a Gaussian:
+/// Gauss-Hermite quadrature with three places along each axis.
+constexpr std::size_t kSamples = 27;
+constexpr double kSampleAt[] = {-1.7320508075688772, 0.0, 1.7320508075688772};
+constexpr float kSampleWeight[] = {1.0f / 6.0f, 2.0f / 3.0f, 1.0f / 6.0f};
+
 void addSamples(const Gaussian& g, std::vector<Place>& places) {
-  const double far = std::sqrt(3.0);
-  for (int c = 0; c < 3; ++c)
-    for (const double side : {-far, far}) {
-      Place place;
-      for (int r = 0; r < 3; ++r) place[r] = g.center[r] + side * g.columns[3 * r + c];
-      places.push_back(place);
-    }
+  for (const double x : kSampleAt)
+    for (const double y : kSampleAt)
+      for (const double z : kSampleAt) {
+        Place place;
+        for (int r = 0; r < 3; ++r)
+          place[r] = g.center[r] + x * g.columns[3 * r] + y * g.columns[3 * r + 1] +
+                     z * g.columns[3 * r + 2];
+        places.push_back(place);
+      }
+}
+
+float weightOf(std::size_t sample) {
+  return kSampleWeight[sample / 9] * kSampleWeight[sample / 3 % 3] * kSampleWeight[sample % 3];
 }
 
 /// The density that a grid's sum stands for at a place: its value by the rule of its nearest voxel, at least 0.
@@ -140,13 +164,13 @@ class Density {
   VoxelRule rule_;
 };
 
-/// Gaussians of a chunk that are treated together, so that their places take little memory.
+/// Ellipsoids of a chunk that are treated together, so that their places take little memory.
 struct Block {
   std::size_t chunk, begin, end;
 };
 
 std::vector<Block> blocksOf(const Field& field) {
-  constexpr std::size_t kBlock = std::size_t{1} << 17;
+  constexpr std::size_t kBlock = std::size_t{1} << 16;
   std::vector<Block> blocks;
   for (std::size_t c = 0; c < field.chunks.size(); ++c) {
     const std::size_t n = field.chunks[c].ellipsoids.size();
@@ -156,11 +180,12 @@ std::vector<Block> blocksOf(const Field& field) {
   return blocks;
 }
 
-/// Fits the amplitudes of Gaussians to the density of a grid.
+/// Fits the amplitudes of positive ellipsoids to the density of a grid. They are as they should be unless the grid
+/// has negative ellipsoids, a clamp, a tone curve, or voxels that are not active.
 class AmplitudeFit {
  public:
-  AmplitudeFit(const StoredGrid& grid, Field& gaussians)
-      : gaussians_(gaussians), blocks_(blocksOf(gaussians)) {
+  AmplitudeFit(const StoredGrid& grid, Field& positive)
+      : positive_(positive), blocks_(blocksOf(positive)) {
     const Density density(grid);
     for (const Block& block : blocks_) {
       const std::vector<Place> places = placesOf(block);
@@ -172,14 +197,13 @@ class AmplitudeFit {
     }
   }
 
-  /// Multiplies each amplitude by the mean ratio of the density to the sum of all Gaussians over the Gaussian.
-  /// This is a step of the Richardson-Lucy method, which keeps amplitudes above 0 and converges to those of
-  /// the highest likelihood.
+  /// Multiplies each amplitude by the mean ratio of the density to the sum. This is a step of the Richardson-Lucy
+  /// method, which keeps amplitudes above 0.
   void improve() {
     std::vector<std::vector<float>> ratios;
     for (std::size_t b = 0; b < blocks_.size(); ++b) ratios.push_back(ratiosOf(b));
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
-      auto& amplitudes = gaussians_.chunks[blocks_[b].chunk].ellipsoids.intensity;
+      auto& amplitudes = positive_.chunks[blocks_[b].chunk].ellipsoids.intensity;
       for (std::size_t i = 0; i < ratios[b].size(); ++i)
         amplitudes[blocks_[b].begin + i] *= ratios[b][i];
     }
@@ -197,25 +221,25 @@ class AmplitudeFit {
     std::vector<Place> places;
     places.reserve((block.end - block.begin) * kSamples);
     for (std::size_t i = block.begin; i < block.end; ++i)
-      addSamples(Gaussian(gaussians_.chunks[block.chunk], i), places);
+      addSamples(Gaussian(positive_.chunks[block.chunk], i), places);
     return places;
   }
 
   [[nodiscard]] std::vector<float> ratiosOf(std::size_t b) const {
     const std::vector<Place> places = placesOf(blocks_[b]);
     std::vector<float> sums(places.size());
-    evaluatePlaces(gaussians_, places, sums);
+    evaluatePlaces(positive_, places, sums);
     std::vector<float> ratios(places.size() / kSamples);
     parallelFor(std::size_t{0}, ratios.size(), [&](std::size_t i) {
       float sum = 0.0f;
-      for (std::size_t p = i * kSamples; p < (i + 1) * kSamples; ++p)
-        if (sums[p] > 0.0f) sum += densities_[b][p] / sums[p];
-      ratios[i] = sum / float(kSamples);
+      for (std::size_t s = 0, p = i * kSamples; s < kSamples; ++s, ++p)
+        if (sums[p] > 0.0f) sum += weightOf(s) * densities_[b][p] / sums[p];
+      ratios[i] = sum;
     });
     return ratios;
   }
 
-  Field& gaussians_;
+  Field& positive_;
   std::vector<Block> blocks_;
   std::vector<std::vector<float>> densities_;  ///< by block
 };
@@ -289,24 +313,43 @@ FileSpace fileSpaceOf(const StoredGrid& grid, const SplatOptions& options) {
 
 /// The alphas that all formats keep: whole numbers of 255ths. Readers that cut the rest off get a little more.
 struct AlphaLevel {
-  static constexpr double kSteps = 255.0, kAbove = 0.02, kFirst = 1.0, kLast = 252.0;
+  static constexpr double kSteps = 255.0, kAbove = 0.02;
   double level;
 
   /// The nearest one.
-  explicit AlphaLevel(double alpha)
-      : level(std::clamp(std::round(alpha * kSteps), kFirst, kLast)) {}
+  explicit AlphaLevel(double alpha) : level(std::max(std::round(alpha * kSteps), 1.0)) {}
   [[nodiscard]] double alpha() const { return (level + kAbove) / kSteps; }
 };
 
 /// The sizes that all formats keep, in units of a file of the form kPly.
 constexpr double kSmallestSize = 0.0005, kLargestSize = 300.0;
 
+/// A splat, or several ones at the same place.
 struct Splat {
   std::array<double, 3> center;
   PrincipalGaussian shape;
-  double alpha;
-  bool isFaint = false, isClamped = false;
+  double alpha = 0.0;
+  int copies = 0;         ///< 0: it is too faint for the formats
+  double integral = 0.0;  ///< of its extinction over space
+  bool isClamped = false;
 };
+
+/// A splat of a depth tau hides 1 - exp(-tau g) beside its center, where g is a Gaussian, but a reader draws
+/// (1 - exp(-tau)) g, which is less. Several splats at one place, each with a part of the depth, are close to it.
+constexpr double kDeepest = 1.0;
+constexpr double kMostCopies = 16.0;
+
+/// Sets the alpha and the size of a splat. \param depth  its optical depth through the center
+void setAlpha(double depth, Splat& splat) {
+  const double copies = std::clamp(std::ceil(depth / kDeepest), 1.0, kMostCopies);
+  splat.isClamped = depth > kMostCopies * kDeepest;
+  const double each = std::min(depth / copies, kDeepest), alpha = -std::expm1(-each);
+  const AlphaLevel level(alpha);
+  splat.alpha = level.alpha();
+  splat.copies = alpha * AlphaLevel::kSteps < 0.5 ? 0 : int(copies);
+  // The depth, summed over a picture, stays what it was.
+  for (double& size : splat.shape.sizes) size *= std::sqrt(each / depthOfAlpha(splat.alpha));
+}
 
 Splat splatOf(const Gaussian& g, double amplitude, const FileSpace& space,
               const SplatOptions& options) {
@@ -322,16 +365,10 @@ Splat splatOf(const Gaussian& g, double amplitude, const FileSpace& space,
   }
   splat.shape = principalAxesOf(columns);
   Sizes& sizes = splat.shape.sizes;
-  // Flat Gaussians get thicker, and keep the integral of their density.
-  const double integral =
-      amplitude * gaussianVolume() / (2.0 * std::numbers::pi) * sizes[0] * sizes[1] * sizes[2];
+  splat.integral = amplitude * gaussianVolume() * sizes[0] * sizes[1] * sizes[2];
+  // Flat Gaussians get thicker, and keep their integral.
   for (double& size : sizes) size = std::max(size, sizes[0] / kMostFlat);
-  const double depth = integral / meanShadow(sizes);
-  const AlphaLevel level(-std::expm1(-depth));
-  splat.alpha = level.alpha();
-  splat.isFaint = !(-std::expm1(-depth) * AlphaLevel::kSteps >= 0.5);
-  const double grown = std::sqrt(depth / depthOfAlpha(splat.alpha));
-  for (double& size : sizes) size *= grown;
+  setAlpha(splat.integral / (2.0 * std::numbers::pi * meanShadow(sizes)), splat);
   if (options.form == SplatForm::kPly)
     for (double& size : sizes) {
       const double kept = std::clamp(size, kSmallestSize, kLargestSize);
@@ -357,10 +394,11 @@ void append(const Splat& splat, const Rgb& color, Splats& to) {
 Rgb meanColor(const ColorMap& colors, std::span<const float> densities) {
   Rgb sum;
   double weight = 0.0;
-  for (const float v : densities) {
-    const Rgb color = colorAt(colors, double(v));
-    sum.r += double(v) * color.r, sum.g += double(v) * color.g, sum.b += double(v) * color.b;
-    weight += double(v);
+  for (std::size_t s = 0; s < kSamples; ++s) {
+    const double v = double(densities[s]), share = v * double(weightOf(s));
+    const Rgb color = colorAt(colors, v);
+    sum.r += share * color.r, sum.g += share * color.g, sum.b += share * color.b;
+    weight += share;
   }
   if (!(weight > 0.0)) return colorAt(colors, 0.0);
   return {sum.r / weight, sum.g / weight, sum.b / weight};
@@ -389,7 +427,8 @@ double densityScaleOf(const StoredGrid& grid, const SplatOptions& options) {
 
 MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options) {
   using namespace splats;
-  constexpr int kRounds = 8;
+  constexpr int kRounds = 4;  // six change pictures by less than 0.1 dB (docs/splats.md)
+  constexpr std::size_t kBetweenChecks = 4096;
   checkTransferFunction({options.colors, {{0.0, 1.0}}});
   requireEllipsoids(grid);
   MadeSplats made;
@@ -400,26 +439,28 @@ MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options) {
   scene.densityScale = densityScaleOf(grid, options);
   const FileSpace space = fileSpaceOf(grid, options);
   scene.toWorld = space.toWorld;
-  Field gaussians = gaussiansOf(grid.field);
+  Field gaussians = positiveOf(grid.field);
   made.negative = made.ellipsoids - gaussians.ellipsoidCount();
   AmplitudeFit fit(grid, gaussians);
   for (int round = 0; round < kRounds; ++round) fit.improve();
+  becomeGaussians(gaussians);
   const std::vector<float> densities = fit.densities();
   const double extinction = scene.densityScale / space.perWorld;  // in the file
   std::size_t number = 0;
+  double whole = 0.0, faint = 0.0;
   for (const Chunk& chunk : gaussians.chunks)
     for (std::size_t i = 0; i < chunk.ellipsoids.size(); ++i, ++number) {
+      if (number % kBetweenChecks == 0) throwIfCancelled();
       const double amplitude = extinction * double(chunk.ellipsoids.intensity[i]);
       const Splat splat = splatOf(Gaussian(chunk, i), amplitude, space, options);
-      if (splat.isFaint) {
-        ++made.faint;
-        continue;
-      }
+      whole += splat.integral;
+      if (splat.copies == 0) faint += splat.integral;
       made.clamped += splat.isClamped;
-      append(splat,
-             meanColor(options.colors, std::span(densities).subspan(number * kSamples, kSamples)),
-             scene.splats);
+      const Rgb color =
+          meanColor(options.colors, std::span(densities).subspan(number * kSamples, kSamples));
+      for (int copy = 0; copy < splat.copies; ++copy) append(splat, color, scene.splats);
     }
+  made.faintShare = whole > 0.0 ? faint / whole : 0.0;
   if (scene.splats.size() == 0)
     refuse(grid, "all splats would be too faint; raise the density scale");
   return made;

@@ -119,8 +119,8 @@ struct MadeSplats {
   std::uint64_t ellipsoids = 0;  ///< of the grid
   std::uint64_t negative =
       0;  ///< ellipsoids without a splat, because they take away from the others
-  std::uint64_t faint =
-      0;  ///< ellipsoids without a splat, because it would be too faint to be drawn
+  /// The share of the optical depth that is left out, because it is in splats with an alpha below 1/510.
+  double faintShare = 0.0;
   std::uint64_t clamped = 0;  ///< splats whose size or alpha is at a limit of the formats
 };
 
