@@ -79,7 +79,7 @@ cli::ProgramText programText() {
           "  esvr2vdb smoke.esvr 'back.####.vdb' --frames 10-20   # frames of a sequence\n"
           "  esvr2vdb smoke.esvr smoke.ply --colors 0.9,0.9,0.9   # splats for viewers\n"
           "  esvr2vdb smoke.esvr smoke.usda --colors inferno      # splats for USD\n"
-          "  esvr2vdb splats.ply cloud.vdb --voxel-size 0.05      # a density from splats\n"
+          "  esvr2vdb splats.ply cloud.vdb --voxel-size 0.5       # a density from splats\n"
           "  esvr2vdb --list smoke.vdb"};
 }
 

@@ -116,7 +116,7 @@ cli::ProgramText programText() {
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
           "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
           "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file\n"
-          "  vdb2esvr splats.ply splats.esvr --voxel-size 0.05   # the density of splats"};
+          "  vdb2esvr splats.ply splats.esvr --voxel-size 1      # the density of splats"};
 }
 
 void addGoalOptions(cli::po::options_description& options) {

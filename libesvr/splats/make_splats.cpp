@@ -311,14 +311,16 @@ FileSpace fileSpaceOf(const StoredGrid& grid, const SplatOptions& options) {
 
 // From a Gaussian of the density to a splat.
 
-/// The alphas that all formats keep: whole numbers of 255ths. Readers that cut the rest off get a little more.
+/// The alphas that all formats keep: whole numbers of 255ths, and at least one.
 struct AlphaLevel {
-  static constexpr double kSteps = 255.0, kAbove = 0.02;
+  static constexpr double kSteps = 255.0;
   double level;
 
   /// The nearest one.
   explicit AlphaLevel(double alpha) : level(std::max(std::round(alpha * kSteps), 1.0)) {}
-  [[nodiscard]] double alpha() const { return (level + kAbove) / kSteps; }
+  [[nodiscard]] double alpha() const { return level / kSteps; }
+  /// A little more, for writers that cut what is below a level; float32 rounds by less.
+  [[nodiscard]] double written() const { return (level + 0.002) / kSteps; }
 };
 
 /// The sizes that all formats keep, in units of a file of the form kPly.
@@ -345,10 +347,10 @@ void setAlpha(double depth, Splat& splat) {
   splat.isClamped = depth > kMostCopies * kDeepest;
   const double each = std::min(depth / copies, kDeepest), alpha = -std::expm1(-each);
   const AlphaLevel level(alpha);
-  splat.alpha = level.alpha();
+  splat.alpha = level.written();
   splat.copies = alpha * AlphaLevel::kSteps < 0.5 ? 0 : int(copies);
   // The depth, summed over a picture, stays what it was.
-  for (double& size : splat.shape.sizes) size *= std::sqrt(each / depthOfAlpha(splat.alpha));
+  for (double& size : splat.shape.sizes) size *= std::sqrt(each / depthOfAlpha(level.alpha()));
 }
 
 Splat splatOf(const Gaussian& g, double amplitude, const FileSpace& space,

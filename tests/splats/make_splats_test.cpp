@@ -68,7 +68,8 @@ TEST(MakeSplats, KeepTheOpticalDepthOfEllipsoids) {
           splats::gaussianOf(grid.field.kernel, double(grid.field.kernel.kappa)).volume;
       const double wanted =
           kDensityScale * double(intensity) * volume * scales[0] * scales[1] * scales[2] / 8.0;
-      EXPECT_NEAR(depthOf(made.scene.splats), wanted, 1e-3 * wanted) << intensity;
+      // An alpha is written up to 0.002 of 255 too high.
+      EXPECT_NEAR(depthOf(made.scene.splats), wanted, 2e-3 * wanted) << intensity;
     }
 }
 
@@ -102,7 +103,7 @@ TEST(MakeSplats, HaveAlphasThatEightBitsKeep) {
   for (const float alpha : made.scene.splats.alpha) {
     const double steps = 255.0 * double(alpha), rest = steps - std::floor(steps);
     EXPECT_GE(steps, 1.0);
-    EXPECT_NEAR(rest, 0.02, 1e-3);
+    EXPECT_NEAR(rest, 0.002, 1e-4);
   }
 }
 
