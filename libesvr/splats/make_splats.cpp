@@ -12,6 +12,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/splats.h"
+#include "field/evaluate.h"
 #include "field/voxel_rule.h"
 #include "splats/gaussian.h"
 
@@ -45,6 +46,7 @@ void requireEllipsoids(const StoredGrid& grid) {
     refuse(grid, "its background is " + std::to_string(grid.descriptor.background) +
                      ", and splats leave space empty; subtract the background first");
   if (grid.field.ellipsoidCount() == 0) refuse(grid, "it has no ellipsoids");
+  if (grid.activeBox.empty()) refuse(grid, "no voxel of it is active");
   if (!grid.descriptor.transform.affine)
     refuse(grid, "its transform is a frustum, in which ellipsoids have no shape of their own");
 }
@@ -92,6 +94,19 @@ void becomeGaussians(Field& field) {
     e.kappa.clear();
   }
   field.kernel = gaussianKernel();
+}
+
+/// The integral of a sum of Gaussians of becomeGaussians().
+double integralOf(const Field& gaussians) {
+  double integral = 0.0;
+  for (const Chunk& chunk : gaussians.chunks) {
+    const Ellipsoids& e = chunk.ellipsoids;
+    for (std::size_t i = 0; i < e.size(); ++i)
+      integral +=
+          double(e.intensity[i]) *
+          std::exp(double(e.logScale[0][i]) + double(e.logScale[1][i]) + double(e.logScale[2][i]));
+  }
+  return integral * gaussianVolume() / (2.0 * std::numbers::sqrt2);
 }
 
 /// One ellipsoid of a field in float64. The columns are the standard deviations of a Gaussian, and about those
@@ -163,6 +178,24 @@ class Density {
   RevoxeliseOptions options_;
   VoxelRule rule_;
 };
+
+/// The sum of the density over all voxels, which is its integral in index space.
+double integralOf(const StoredGrid& grid, const Density& density) {
+  const std::vector<Coord> corners = reachedBricks(grid.field, grid.activeBox);
+  double integral = 0.0;
+  forEachBatch(grid.field, corners, [&](const BrickBatch& batch) {
+    std::vector<double> sums(batch.size());
+    parallelFor(std::size_t{0}, batch.size(), [&](std::size_t b) {
+      const auto values = batch.values(b);
+      for (int v = 0; v < kBrickVoxels; ++v) {
+        const Coord voxel = batch.corners[b] + voxelLocal(v);
+        sums[b] += double(density({double(voxel.x), double(voxel.y), double(voxel.z)}, values[v]));
+      }
+    });
+    for (const double sum : sums) integral += sum;
+  });
+  return integral;
+}
 
 /// Ellipsoids of a chunk that are treated together, so that their places take little memory.
 struct Block {
@@ -285,7 +318,7 @@ WorldBox worldBox(const Box& box, const std::array<double, 16>& affine) {
 }
 
 FileSpace fileSpaceOf(const StoredGrid& grid, const SplatOptions& options) {
-  constexpr double kLongestSide = 10.0;  // splat_formats: docs/splats.md, "Quantisation"
+  constexpr double kLongestSide = 10.0;  // .spz keeps places to 1/4096, and +-2048
   const auto& affine = *grid.descriptor.transform.affine;
   const WorldBox box = worldBox(grid.activeBox, affine);
   const Matrix3 turn = turnOf(options);
@@ -447,7 +480,11 @@ MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options) {
   for (int round = 0; round < kRounds; ++round) fit.improve();
   becomeGaussians(gaussians);
   const std::vector<float> densities = fit.densities();
-  const double extinction = scene.densityScale / space.perWorld;  // in the file
+  const double present = integralOf(gaussians), wanted = integralOf(grid, Density(grid));
+  if (!(present > 0.0 && wanted > 0.0 && std::isfinite(wanted / present)))
+    refuse(grid, "its density is 0 everywhere, or too large for sums");
+  const double extinction =
+      scene.densityScale / space.perWorld * (wanted / present);  // in the file
   std::size_t number = 0;
   double whole = 0.0, faint = 0.0;
   for (const Chunk& chunk : gaussians.chunks)

@@ -426,6 +426,9 @@ class SplatReader {
 
   // Our comments.
 
+  /// Numbers beyond these would overflow, and are none of a scene.
+  static constexpr double kSmallest = 1e-30, kLargest = 1e30;
+
   void readPlacement() {
     SplatScene& scene = result_.scene;
     for (const std::string& comment : header_.comments) {
@@ -462,12 +465,15 @@ class SplatReader {
   /// The matrix turns, scales alike along all axes, and shifts.
   void requireSimilarity(const std::array<double, 16>& m) const {
     constexpr double kTolerance = 1e-6;
+    for (const double entry : m)
+      if (!(std::abs(entry) < kLargest))
+        fail(std::string("its comment ") + kMatrixWord + " is too large");
     const auto dot = [&](std::size_t i, std::size_t j) {
       return m[4 * i] * m[4 * j] + m[4 * i + 1] * m[4 * j + 1] + m[4 * i + 2] * m[4 * j + 2];
     };
     const double square = dot(0, 0);
-    bool isOne =
-        std::isnormal(square) && m[3] == 0.0 && m[7] == 0.0 && m[11] == 0.0 && m[15] == 1.0;
+    bool isOne = square > kSmallest * kSmallest && square < kLargest * kLargest && m[3] == 0.0 &&
+                 m[7] == 0.0 && m[11] == 0.0 && m[15] == 1.0;
     for (std::size_t i = 0; i < 3; ++i)
       for (std::size_t j = 0; j < 3; ++j)
         isOne = isOne && std::abs(dot(i, j) - (i == j ? square : 0.0)) <= kTolerance * square;
@@ -481,8 +487,8 @@ class SplatReader {
 
   double readDensityScale(const std::vector<std::string>& words) const {
     const auto number = parseNumber(words.back());
-    if (!number || !(*number > 0.0))
-      fail(std::string("its comment ") + kDensityWord + " has no number above 0");
+    if (!number || !(*number > kSmallest && *number < kLargest))
+      fail(std::string("its comment ") + kDensityWord + " has no usual number above 0");
     return *number;
   }
 

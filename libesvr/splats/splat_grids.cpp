@@ -115,6 +115,8 @@ class SplatDensity {
 
  private:
   static constexpr std::size_t kBetweenChecks = 4096;
+  static constexpr double kDensest =
+      1e30;  // sums of as many splats as there may be stay in float32
 
   Sizes sizesOf(std::size_t i, std::uint64_t& thickened) const {
     Sizes sizes;
@@ -128,15 +130,16 @@ class SplatDensity {
   static void requireReasonable(std::size_t i, const std::array<double, 3>& place,
                                 const Sizes& sizes, std::uint64_t maxBytes) {
     constexpr double kFarthest = 0x1p30, kBytesPerVoxel = 4.0, kReach = 4.3;
-    double farthest = 0.0, voxels = 4.0 / 3.0 * std::numbers::pi;
+    const double reach = kReach * *std::max_element(sizes.begin(), sizes.end());
+    const bool isNear = std::all_of(place.begin(), place.end(),
+                                    [&](double p) { return std::abs(p) + reach < kFarthest; });
+    double voxels = 4.0 / 3.0 * std::numbers::pi;
     for (const double size : sizes) voxels *= std::max(kReach * size, 1.0);
-    for (const double p : place) farthest = std::max(farthest, std::abs(p));
-    farthest += kReach * *std::max_element(sizes.begin(), sizes.end());
-    if (farthest < kFarthest && voxels * kBytesPerVoxel <= double(maxBytes)) return;
-    throw BadInput("splat " + std::to_string(i) + " reaches " +
-                   (farthest < kFarthest ? "more voxels than there is memory for"
-                                         : "beyond the index space of a grid") +
-                   "; the voxels are too small, or the splat is a stray one");
+    if (isNear && voxels * kBytesPerVoxel <= double(maxBytes)) return;
+    throw BadInput(
+        "splat " + std::to_string(i) + " reaches " +
+        (isNear ? "more voxels than there is memory for" : "beyond the index space of a grid") +
+        "; the voxels are too small, or the splat is a stray one");
   }
 
   static Coord chunkAt(const std::array<double, 3>& place) {
@@ -160,6 +163,9 @@ class SplatDensity {
       to.logScale[a].push_back(float(std::log(size * std::numbers::sqrt2)));
     }
     for (std::size_t a = 0; a < 4; ++a) to.rotation[a].push_back(float(rotation[a]));
+    if (!(amplitude < kDensest))
+      throw BadInput("the density of splat " + std::to_string(i) +
+                     " is too large; the density scale is too small");
     to.intensity.push_back(float(amplitude));
   }
 

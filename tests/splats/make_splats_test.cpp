@@ -11,6 +11,7 @@
 #include "core/geometry.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
+#include "esvr/grid_coding.h"
 #include "esvr/splats.h"
 #include "splats/gaussian.h"
 
@@ -159,23 +160,28 @@ TEST(MakeSplats, HaveTheColorOfTheirValue) {
   EXPECT_EQ(s.color[2][0], 0.0f);
 }
 
-TEST(MakeSplats, FollowClampsTonesAndNegativeEllipsoids) {
-  const auto depthFor = [](const StoredGrid& grid) {
-    return depthOf(makeSplats(grid, whiteIn(SplatForm::kMitsuba, 0.05)).scene.splats);
+TEST(MakeSplats, FollowClampsTonesThresholdsAndNegativeEllipsoids) {
+  const auto expectDepth = [](const StoredGrid& grid) {
+    constexpr double kDensityScale = 0.05, kVoxel = 0.125;
+    double integral = 0.0;  // of the decoded voxels
+    for (const float value : decodeGrid(grid).values) integral += double(value) * kVoxel;
+    const auto made = makeSplats(grid, whiteIn(SplatForm::kMitsuba, kDensityScale));
+    EXPECT_NEAR(depthOf(made.scene.splats), kDensityScale * integral,
+                2e-3 * kDensityScale * integral);
+    return made;
   };
   StoredGrid grid = gridOf({{0, 0, 0}}, {5.0, 5.0, 5.0}, 2.0f);
-  const double whole = depthFor(grid);
+  expectDepth(grid);
   grid.valueMax = 1.0f;  // the sum is clamped to it
-  EXPECT_LT(depthFor(grid), 0.75 * whole);
+  expectDepth(grid);
   grid.valueMax = 100.0f;
-  grid.tone.scale = 0.5f;  // sinh(4) / 2 is 13.6
-  EXPECT_GT(depthFor(grid), 2.0 * whole);
-  grid.tone.scale = 0.0f;
-  StoredGrid less = gridOf({{0, 0, 0}, {0, 0, 0}}, {5.0, 5.0, 5.0}, 2.0f);
+  grid.activeThreshold = 0.5f;
+  expectDepth(grid);
+  grid.tone.scale = 0.5f;
+  expectDepth(grid);
+  StoredGrid less = gridOf({{0, 0, 0}, {4, 0, 0}}, {5.0, 5.0, 5.0}, 2.0f);
   less.field.chunks[0].ellipsoids.intensity[1] = -1.0f;
-  const auto made = makeSplats(less, whiteIn(SplatForm::kMitsuba, 0.05));
-  EXPECT_EQ(made.negative, 1u);
-  EXPECT_NEAR(depthOf(made.scene.splats), 0.5 * whole, 0.02 * whole);
+  EXPECT_EQ(expectDepth(less).negative, 1u);
 }
 
 TEST(MakeSplats, SayWhatTheyLeaveOut) {
