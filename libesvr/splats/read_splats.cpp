@@ -55,7 +55,7 @@ struct Element {
 
 enum class Form { kAscii, kLittleEndian, kBigEndian };
 
-struct Header {
+struct PlyHeader {
   std::optional<Form> form;
   std::vector<Element> elements;
   std::vector<std::string> comments;
@@ -78,7 +78,7 @@ class HeaderReader {
   HeaderReader(std::span<const std::byte> bytes, const std::string& file)
       : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), file_(file) {}
 
-  Header read() {
+  PlyHeader read() {
     if (nextLine() != "ply") fail("it is no PLY file");
     for (std::string_view line = nextLine(); line != "end_header"; line = nextLine()) take(line);
     if (!header_.form) fail("its header has no format");
@@ -156,7 +156,7 @@ class HeaderReader {
   std::string_view text_;
   const std::string& file_;
   std::size_t at_ = 0;
-  Header header_;
+  PlyHeader header_;
 };
 
 // Rows.
@@ -284,7 +284,7 @@ constexpr const char* kSlotNames[kSlots] = {"x",       "y",       "z",      "opa
                                             "scale_1", "scale_2", "rot_0",  "rot_1",   "rot_2",
                                             "rot_3",   "f_dc_0",  "f_dc_1", "f_dc_2"};
 constexpr std::size_t kNoSlot = kSlots;
-using Row = std::array<double, kSlots>;
+using SplatRow = std::array<double, kSlots>;
 
 class SplatReader {
  public:
@@ -378,7 +378,7 @@ class SplatReader {
     const auto slots = slotsOf(vertex);
     requireWithinMemory(double(vertex.count) * kBytesPerSplat, options_.maxBytes, file_);
     result_.inFile = vertex.count;
-    Row row{};
+    SplatRow row{};
     readRows(
         vertex,
         [&](std::size_t p, double value) {
@@ -389,7 +389,7 @@ class SplatReader {
       fail("none of its " + std::to_string(vertex.count) + " splats can be used");
   }
 
-  void add(Row row) {
+  void add(SplatRow row) {
     // A standard deviation of 0 and an alpha of 1 have infinite logarithms.
     const double largest = std::max({row[kScale0], row[kScale1], row[kScale2]});
     const double flattest = largest - std::log(kMostFlat);
@@ -418,7 +418,7 @@ class SplatReader {
     splats.alpha.push_back(float(alpha));
   }
 
-  static bool areFinite(const Row& row) {
+  static bool areFinite(const SplatRow& row) {
     return std::all_of(row.begin(), row.end(), [&](const double& v) {
       return &v == &row[kOpacity] ? !std::isnan(v) : std::isfinite(float(v));
     });
@@ -494,7 +494,7 @@ class SplatReader {
 
   const std::string& file_;
   const SplatReadOptions& options_;
-  Header header_;
+  PlyHeader header_;
   std::unique_ptr<Numbers> numbers_;
   bool hasColors_ = false;
   SplatFile result_;

@@ -22,7 +22,7 @@ static_assert(std::endian::native == std::endian::little,
 
 /// The shortest text that reads as the same number.
 template <class Real>
-void add(std::string& text, Real number) {
+void addNumber(std::string& text, Real number) {
   std::array<char, 32> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   text.append(digits.data(), end);
@@ -45,10 +45,10 @@ std::string plainName(const std::string& name) {
 /// What the header says about the place of the splats in the world, which readSplats() reads.
 std::string placementComments(const SplatScene& scene) {
   std::string text = std::string("comment ") + kMatrixWord;
-  for (const double entry : scene.toWorld) text += ' ', add(text, entry);
+  for (const double entry : scene.toWorld) text += ' ', addNumber(text, entry);
   text += std::string("\ncomment ") + kUpWord + (scene.up == UpAxis::kZ ? " z" : " y");
   text += std::string("\ncomment ") + kDensityWord + ' ';
-  add(text, scene.densityScale);
+  addNumber(text, scene.densityScale);
   return text + "\ncomment " + kGridWord + ' ' + plainName(scene.name) + '\n';
 }
 
@@ -118,7 +118,7 @@ class UsdArrays {
       if (components > 1) text_ += '(';
       for (std::size_t c = 0; c < components; ++c) {
         if (c > 0) text_ += ", ";
-        add(text_, number(c, i));
+        addNumber(text_, number(c, i));
       }
       if (components > 1) text_ += ')';
       if (text_.size() > kPiece) flush();
@@ -161,7 +161,7 @@ std::string matrixText(const std::array<double, 16>& m) {
     text += r > 0 ? ", (" : " (";
     for (std::size_t c = 0; c < 4; ++c) {
       if (c > 0) text += ", ";
-      add(text, m[4 * r + c]);
+      addNumber(text, m[4 * r + c]);
     }
     text += ')';
   }
@@ -174,7 +174,7 @@ void writeUsd(AtomicFile& file, const SplatScene& scene) {
   UsdArrays out(file);
   out.write("#usda 1.0\n(\n    customLayerData = {\n        double esvr_density_scale = ");
   std::string number;
-  add(number, scene.densityScale);
+  addNumber(number, scene.densityScale);
   out.write(number + "\n    }\n    defaultPrim = \"" + prim +
             "\"\n    metersPerUnit = 1\n    upAxis = \"" + (scene.up == UpAxis::kZ ? "Z" : "Y") +
             "\"\n)\n\ndef ParticleField3DGaussianSplat \"" + prim + "\"\n{\n");
