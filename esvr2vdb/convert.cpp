@@ -22,6 +22,7 @@
 #include "esvr/grid.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
+#include "esvr2vdb/splats.h"
 #include "programs/files.h"
 #include "programs/messages.h"
 #include "programs/names.h"
@@ -161,7 +162,7 @@ using DecodedGrid = std::variant<VolumeGrid, VectorGrid>;
 /// Checks everything that can be checked before the work begins.
 void checkFiles(const Options& options) {
   cli::requireSeparate(options.inputs.paths, {options.output});
-  cli::checkOutput(options.output, {".vdb", ".nvdb"}, options.write.overwrite);
+  cli::checkOutput(options.output, {".vdb", ".nvdb", ".ply", ".usda"}, options.write.overwrite);
 }
 
 bool writesNano(const Options& options) { return options.output.extension() == ".nvdb"; }
@@ -401,6 +402,7 @@ void convertFile(const Options& options, const CancelToken& cancel, const cli::L
 
 void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
+  if (writesSplats(options)) return exportSplats(options, file, log);
   const auto chosen = writable(chooseGrids(options.input, file, options.grids), options, log);
   cli::WatchedInputs watched;
   if (options.reference) watched.add(*options.reference);

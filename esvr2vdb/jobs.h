@@ -10,17 +10,25 @@
 #include "esvr/container.h"
 #include "esvr/device.h"
 #include "esvr/grid_coding.h"
+#include "esvr/splats.h"
 #include "esvr/vdb_io.h"
 #include "esvr/volume.h"
 #include "programs/memory.h"
 #include "programs/messages.h"
 #include "programs/sequence.h"
+#include "programs/splat_input.h"
 
 namespace esvr::esvr2vdb {
 
 inline constexpr const char* kProgram = "esvr2vdb";
 
 enum class Job { kConvert, kList, kCheck };
+
+/// What options say about splats that are written or read. The colors are over the values 0 to 1.
+struct SplatWish {
+  SplatOptions made;
+  cli::SplatInput read;
+};
 
 struct Options {
   Job job = Job::kConvert;
@@ -33,6 +41,7 @@ struct Options {
   ReadPart part;                             ///< the part of the file that is read
   std::optional<std::size_t> maxEllipsoids;  ///< keep those of each grid with the largest weight
   WriteOptions write;
+  SplatWish splats;
   std::optional<std::filesystem::path> reference;
   std::optional<Box> box;  ///< box of the PSNR against the reference
   cli::HostMemory memory;  ///< memory that input may take

@@ -1,8 +1,11 @@
 // esvr2vdb: writes VDB files from .esvr files, and lists and checks them. This file has the options and
 // the main function.
-#include "esvr2vdb/jobs.h"
-
+#include <filesystem>
 #include <limits>
+
+#include "esvr/transfer_function.h"
+#include "esvr2vdb/jobs.h"
+#include "esvr2vdb/splats.h"
 
 #include "programs/command_line.h"
 #include "programs/memory.h"
@@ -24,10 +27,13 @@ cli::ProgramText programText() {
           "Converts an .esvr file back to VDB. Names, transforms, metadata and background are "
           "exactly those of the source; voxels have the accuracy that was chosen when the file was "
           "made. Grids that vdb2esvr carried unchanged come back bit for bit, and all grids in "
-          "their order. --list lists the contents of a file, --check verifies it.",
+          "their order. It also writes the ellipsoids of a grid as 3D Gaussian splats, and a VDB "
+          "from splats. --list lists the contents of a file, --check verifies it.",
       .usage =
           "  esvr2vdb IN.esvr OUT.vdb [-g NAME]... [--threshold T] [--reference REF.vdb]\n"
           "  esvr2vdb IN.####.esvr|IN.esvr OUT.####.vdb [--frames 1-100] ...\n"
+          "  esvr2vdb IN.esvr OUT.ply|OUT.usda [-g NAME] [--colors C] [--density-scale D] ...\n"
+          "  esvr2vdb IN.ply OUT.vdb [--voxel-size S] [--density-scale D] [--up A]\n"
           "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb|IN.####.vdb\n"
           "  esvr2vdb --check IN.esvr|IN.####.esvr",
       .notes =
@@ -49,6 +55,12 @@ cli::ProgramText programText() {
           "--list counts bytes that several grids share for the first of them only. The table of "
           "sections names the grid with which a section is shared.\n"
           "\n"
+          "Splats have the optical depth of the grid (docs/splats.md): the extinction over a unit "
+          "of the world is --density-scale times the value, by default such that the median column "
+          "lets half of the light through. A .ply file has y down and its longest side is 10; its "
+          "comments say where it is in the world. From a .ply file, OUT.vdb gets the grid "
+          "\"density\" and, with colors, the vectors \"Cd\".\n"
+          "\n"
           "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the "
           "frame in the name of the file. --list prints its frames and groups, and --check names "
           "each frame that is lost. "
@@ -65,6 +77,9 @@ cli::ProgramText programText() {
           "  esvr2vdb smoke.esvr coarse.vdb --lod 1               # a preview\n"
           "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   # a part of the voxels\n"
           "  esvr2vdb smoke.esvr 'back.####.vdb' --frames 10-20   # frames of a sequence\n"
+          "  esvr2vdb smoke.esvr smoke.ply --colors 0.9,0.9,0.9   # splats for viewers\n"
+          "  esvr2vdb smoke.esvr smoke.usda --colors inferno      # splats for USD\n"
+          "  esvr2vdb splats.ply cloud.vdb --voxel-size 0.5       # a density from splats\n"
           "  esvr2vdb --list smoke.vdb"};
 }
 
@@ -98,8 +113,15 @@ cli::CommandLine commandLine() {
     ("box", value<std::string>()->value_name("BOX"),
      "box of voxels x0,y0,z0,x1,y1,z1 over which PSNR is measured (default: the bounding box of "
      "the reference's active voxels)")
+    ("colors", value<std::string>()->value_name("C")->default_value("viridis"),
+     "colors of splats over the range of the values and the background: a color map of esvr-render, the file of "
+     "a ParaView preset, or one color R,G,B with channels from 0 to 1")
+    ("kind", value<std::string>()->value_name("K")->default_value("viewer"),
+     "form of OUT.ply: viewer (y down, longest side 10), or mitsuba (for the shape ellipsoids of Mitsuba 3, in "
+     "the world)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
+  cli::addSplatInput(line.options());
   cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
   return line;
@@ -141,6 +163,51 @@ void readPart(const Arguments& a, Options& options) {
     options.part.box = options.decode.box = cli::parseBox(*box, "bbox");
 }
 
+/// The colors over the values 0 to 1. \throws UsageError, BadInput  they cannot be read
+ColorMap colorsOf(const Arguments& a) {
+  const auto& text = a.get<std::string>("colors");
+  if (text.find(',') != text.npos) {
+    const auto c = cli::parseNumbers("colors", text, 3);
+    for (const double channel : c) cli::requireRange("colors", channel, 0.0, 1.0);
+    return {.points = {{0.0, {c[0], c[1], c[2]}}}};
+  }
+  if (std::filesystem::path(text).has_extension()) return readParaViewPreset(text).colors;
+  return builtInColorMap(text);
+}
+
+/// Refuses options that say nothing for the files that are read and written.
+void refuseOptions(const Arguments& a, const std::string& files,
+                   std::initializer_list<const char*> options) {
+  for (const char* option : options)
+    if (a.has(option) && !a.values[option].defaulted())
+      throw UsageError("--" + std::string(option) + " says nothing for " + files);
+}
+
+void readSplats(const Arguments& a, Options& options) {
+  const bool isRead = cli::isSplatFile(options.input), isWritten = writesSplats(options);
+  if (!isRead && !isWritten)
+    refuseOptions(a, "files without splats",
+                  {"colors", "kind", "voxel-size", "density-scale", "up"});
+  if (isRead && isWritten) throw UsageError("splats are not converted to splats");
+  if (isRead)
+    refuseOptions(a, "splats in the input",
+                  {"grid", "threshold", "lod", "max-ellipsoids", "bbox", "reference", "box",
+                   "colors", "kind"});
+  if (isWritten)
+    refuseOptions(a, "splats in the output",
+                  {"threshold", "reference", "box", "half", "voxel-size"});
+  if (options.output.extension() == ".usda") refuseOptions(a, "USD", {"kind"});
+  if (options.sequence && (isRead || isWritten))
+    throw UsageError("splats are those of a single frame; name a file of one frame");
+  options.splats.read = cli::splatInputOf(a);
+  options.splats.made = {.form = cli::choose<SplatForm>(
+                             "kind", a.get<std::string>("kind"),
+                             {{"viewer", SplatForm::kPly}, {"mitsuba", SplatForm::kMitsuba}}),
+                         .up = options.splats.read.up,
+                         .colors = isWritten ? colorsOf(a) : ColorMap{},
+                         .densityScale = options.splats.read.densityScale};
+}
+
 void readConversion(const Arguments& a, Options& options) {
   options.output = outputOf(a);
   options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
@@ -160,6 +227,7 @@ void readConversion(const Arguments& a, Options& options) {
       !cli::FramePattern::ofInput(options.reference->string()))
     throw UsageError("--reference needs a pattern for the number of a frame, because '" +
                      options.input.string() + "' is a sequence");
+  readSplats(a, options);
 }
 
 /// \return nothing if --help or --version was printed
@@ -182,6 +250,7 @@ void run(const Options& options) {
   const cli::ThreadLimit threads(options.threads);
   switch (options.job) {
     case Job::kConvert:
+      if (cli::isSplatFile(options.input)) return importSplats(options);
       return options.sequence ? convertSequence(options) : convert(options);
     case Job::kList:
       return list(options);

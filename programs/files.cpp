@@ -43,7 +43,8 @@ constexpr std::array kFormats{PipedFormat{{" BDV\0\0\0\0", 8}, ".vdb"},
                               PipedFormat{"NanoVDB", ".nvdb"},
                               PipedFormat{"\x89"
                                           "ESVR\r\n\n",
-                                          ".esvr"}};
+                                          ".esvr"},
+                              PipedFormat{"ply", ".ply"}};
 constexpr std::size_t kBeginBytes = 8;
 
 std::string shownName(const std::string& input) {
@@ -70,7 +71,7 @@ std::string_view extensionOf(std::span<const std::byte> bytes, const std::string
                               std::min(bytes.size(), kBeginBytes));
   for (const PipedFormat& format : kFormats)
     if (text.starts_with(format.begin)) return format.extension;
-  throw BadInput(name + " is neither an OpenVDB nor a NanoVDB nor an .esvr file" +
+  throw BadInput(name + " is neither an OpenVDB nor a NanoVDB nor an .esvr nor a PLY file" +
                  (bytes.empty() ? ": it is empty" : ""));
 }
 

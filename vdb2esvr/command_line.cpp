@@ -6,6 +6,7 @@
 #include "programs/memory.h"
 #include "programs/messages.h"
 #include "programs/sequence.h"
+#include "programs/splat_input.h"
 #include "vdb2esvr/paper.h"
 
 namespace esvr::vdb2esvr {
@@ -24,6 +25,7 @@ cli::ProgramText programText() {
           "source, and voxels have the chosen accuracy.",
       .usage =
           "  vdb2esvr IN.vdb OUT.esvr [-g NAME]... [--size 50KB | --psnr DB | --count N]\n"
+          "  vdb2esvr IN.ply OUT.esvr [--voxel-size S] [--density-scale D] [--up A] ...\n"
           "  vdb2esvr IN.####.vdb OUT.####.esvr|OUT.esvr [--frames 1-100x2] ...",
       .notes =
           "Without a goal, each grid gets the quality of --preset in as few bytes as were found. "
@@ -49,6 +51,10 @@ cli::ProgramText programText() {
           "IN.vdb may be - for standard input, or a pipe such as <(...). Its bytes are copied to a "
           "file in the folder of --scratch, which has no name. If an input changes while it is "
           "read, the run fails.\n"
+          "\n"
+          "IN may also be a .ply file of 3D Gaussian splats. Its density is evaluated at voxels of "
+          "--voxel-size, and converted like a .vdb file with the grid \"density\" and, with "
+          "colors, the vectors \"Cd\" (docs/splats.md).\n"
           "\n"
           "Grids of vectors are fitted by components, unless they take fewer bytes unchanged. "
           "Grids that are not fitted are carried in the file as the bytes that OpenVDB wrote: "
@@ -111,7 +117,8 @@ cli::ProgramText programText() {
           "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4GB --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
           "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
-          "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file"};
+          "  vdb2esvr 'smoke.####.vdb' smoke.esvr                # all frames in one file\n"
+          "  vdb2esvr splats.ply splats.esvr --voxel-size 1      # the density of splats"};
 }
 
 void addGoalOptions(cli::po::options_description& options) {
@@ -224,6 +231,7 @@ cli::CommandLine commandLine() {
   addGoalOptions(line.options());
   addFileOptions(line.options());
   cli::addSequenceOptions(line.options());
+  cli::addSplatInput(line.options());
   addFitOptions(line.options());
   cli::addHostMemory(line);
   line.mainOptions({"preset", "effort", "size", "ratio", "psnr", "max-error", "lossless", "count",

@@ -326,6 +326,22 @@ void readResume(const Arguments& a, Options& options) {
   if (options.paper) throw UsageError("fits by --paper have no parts for --resume");
 }
 
+/// Reads the options of splats after those of a sequence and --resume.
+void readSplats(const Arguments& a, Options& options) {
+  if (!cli::isSplatFile(options.input)) {
+    for (const char* option : {"voxel-size", "density-scale", "up"})
+      if (a.has(option) && !a.values[option].defaulted())
+        throw UsageError("--" + std::string(option) + " says nothing for an input without splats");
+    return;
+  }
+  if (options.sequence)
+    throw UsageError("splats are those of a single frame; name a file of one frame");
+  if (options.resume)
+    throw UsageError("--resume continues in another run, which needs a .vdb file, not splats");
+  options.splats = {options.input, cli::scratchFolderOf(a), cli::splatInputOf(a),
+                    cli::hostMemoryOf(a)};
+}
+
 /// Reads the options of a sequence after the goal, --resume and --force.
 void readFrames(const Arguments& a, Options& options) {
   options.sequence = cli::readSequence(a, {.output = true});
@@ -367,6 +383,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.device = cli::deviceOf(a);
   readResume(a, options);
   readFrames(a, options);
+  readSplats(a, options);
   options.report = a.find<std::string>("report").value_or("");
   options.progress = progressForm(a);
   options.overwrite = a.get<bool>("force");

@@ -14,6 +14,7 @@
 #include "programs/command_line.h"
 #include "programs/messages.h"
 #include "programs/sequence.h"
+#include "programs/splat_input.h"
 #include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/progress_bar.h"
 
@@ -48,6 +49,7 @@ struct Options {
   std::optional<double> ratio;        ///< size of the input relative to that of the file
   std::optional<PaperMethod> paper;   ///< the paper's method, if it replaces ours
   ReadOptions read;
+  std::optional<cli::SplatsAsVdb::Source> splats;  ///< the input, if it has splats
   std::string device = "auto";
   bool resume = false;    ///< parts are kept in a folder until the file is written
   bool onlyFits = false;  ///< the process is a rank of MPI above 0, which writes no file

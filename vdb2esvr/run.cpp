@@ -494,10 +494,24 @@ int runAs(const Options& options, Ranks* ranks) {
   return 0;
 }
 
+/// Converts the grids that become of splats.
+int runSplats(Options options, Ranks* ranks) {
+  checkFiles(options);
+  std::optional<cli::SplatsAsVdb> vdb;
+  {
+    const cli::Interrupts interrupts;
+    const cli::ThreadLimit threads(options.threads);
+    vdb.emplace(*options.splats, cli::Log(kProgram, options.verbosity));
+  }
+  options.input = vdb->path();
+  return runAs(optionsOf(options, ranks), ranks);
+}
+
 }  // namespace
 
 int run(const Options& options, Ranks* ranks) {
   if (options.sequence) return runSequence(options, ranks);
+  if (options.splats) return runSplats(options, ranks);
   return runAs(optionsOf(options, ranks), ranks);
 }
 

@@ -39,6 +39,7 @@ Table vdb2esvrTests() {
   return {{"--box", "Vdb2EsvrOption.boxIsWherePsnrIsTaken"},
           {"--chunk-voxels", "Vdb2EsvrOption.chunkVoxelsDivideTheFit"},
           {"--count", "Vdb2EsvrOption.countIsTheNumberOfEllipsoids"},
+          {"--density-scale", "SplatFiles.HaveTheColorsAndTheDensityThatAreAskedFor"},
           {"--device", "Vdb2EsvrOption.devicesAreTakenAsNamed"},
           {"--effort", "Vdb2EsvrOption.effortLengthensTheFit"},
           {"--force", "Vdb2Esvr.keepsAnExistingFileUnlessForced"},
@@ -74,17 +75,22 @@ Table vdb2esvrTests() {
           {"--storage", "Vdb2EsvrOption.storageIsCompactOrFloat32"},
           {"--threads", "Vdb2Esvr.givesTheSameBytesInEveryRunOnAnyNumberOfThreads"},
           {"--tone", "Vdb2EsvrOption.toneIsStored"},
-          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"}};
+          {"--topology", "Vdb2Esvr.storesTheMaskWhereAsked"},
+          {"--up", "SplatFiles.AreTurnedAsTheUpwardAxisSays"},
+          {"--voxel-size", "SplatFiles.AreConvertedLikeAVdb"}};
 }
 
 Table esvr2vdbTests() {
   return {{"--bbox", "Esvr2Vdb.writesAPartOfTheVoxelsWithoutReadingTheRest"},
           {"--box", "Esvr2VdbOption.boxIsWherePsnrIsTaken"},
           {"--check", "Esvr2Vdb.checksAFile"},
+          {"--colors", "SplatFiles.HaveTheColorsAndTheDensityThatAreAskedFor"},
+          {"--density-scale", "SplatFiles.HaveTheColorsAndTheDensityThatAreAskedFor"},
           {"--force", "Esvr2Vdb.keepsAnExistingFileUnlessForced"},
           {"--frames", "SequenceBack.hasTheVoxelsOfSingleFiles"},
           {"--grid", "Esvr2Vdb.writesTheGridsThatAreNamedOnly"},
           {"--half", "Esvr2Vdb.savesAsHalfWhereAsked"},
+          {"--kind", "SplatFiles.AreWrittenInEveryForm"},
           {"--list", "Esvr2Vdb.listsGridsAndSections"},
           {"--lod", "Esvr2Vdb.writesTheHeaviestEllipsoidsOnly"},
           {"--max-ellipsoids", "Esvr2Vdb.writesTheHeaviestEllipsoidsOnly"},
@@ -94,7 +100,9 @@ Table esvr2vdbTests() {
           {"--on-error", "SequenceBack.namesDamagedFramesAndStopsWhereAsked"},
           {"--reference", "Esvr2Vdb.printsTheErrorAgainstAReference"},
           {"--scratch", "Scratch.HoldsVoxelsOfLosslessFilesOnTheWayThereAndBack"},
-          {"--threshold", "Esvr2Vdb.hasFewerActiveVoxelsAtAHigherThreshold"}};
+          {"--threshold", "Esvr2Vdb.hasFewerActiveVoxelsAtAHigherThreshold"},
+          {"--up", "SplatFiles.AreTurnedAsTheUpwardAxisSays"},
+          {"--voxel-size", "SplatFiles.ComeBackAsADensityInItsPlace"}};
 }
 
 Table renderTests() {

@@ -68,7 +68,7 @@ class Inputs:
         if name in FITTED:
             return lambda path: self.fit(path, FITTED[name])
         return {"smoke.####.vdb": self.frames, "ct.vdb": self.image, "out.raw": lambda path: path.write_bytes(ball()),
-                "back.vdb": self.back}.get(name)
+                "back.vdb": self.back, "splats.ply": self.splats}.get(name)
 
     def text(self, path, text):
         path.parent.mkdir(exist_ok=True)
@@ -102,6 +102,11 @@ class Inputs:
         folder.mkdir(exist_ok=True)
         self.maker(source)(folder / source)
         program("vdb2esvr", folder / source, path, *options)
+
+    def splats(self, path):
+        fitted = self.folder / "of-splats.esvr"
+        self.convert(fitted, "smoke.vdb", "--psnr", "40", "--representation", "ellipsoids", "--force")
+        program("esvr2vdb", fitted, path)
 
     def back(self, path):
         near = self.folder / "of-near.esvr"

@@ -13,11 +13,13 @@ x, y, z.
 from . import _html, _openvdb
 from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, GridBuilder,
                     MemoryExceeded, Metrics, PackedGrid, Sequence, TargetMissed, UsageError, Volume,
-                    __version__, compare, convert, fit, frames, list_grids, read, write, write_vdb)
+                     __version__, compare, convert, fit, frames, list_grids, read, read_splats, write,
+                     write_splats, write_vdb)
 
 __all__ = ["BadInput", "Cancelled", "DeviceError", "Ellipsoids", "Error", "File", "Grid", "GridBuilder",
            "MemoryExceeded", "Metrics", "PackedGrid", "Sequence", "TargetMissed", "UsageError", "Volume",
-           "__version__", "compare", "convert", "fit", "frames", "list_grids", "read", "write", "write_vdb"]
+           "__version__", "compare", "convert", "fit", "frames", "list_grids", "read", "read_splats", "write",
+           "write_splats", "write_vdb"]
 
 Volume._repr_html_ = _html.of_volume
 Grid._repr_html_ = _html.of_grid

@@ -158,5 +158,6 @@ PYBIND11_MODULE(_core, module) {
   addFiles(module);
   addFit(module);
   addRender(module);
+  addSplats(module);
   addCompare(module);
 }

@@ -111,5 +111,6 @@ void addGrid(py::module_& module);
 void addFiles(py::module_& module);
 void addFit(py::module_& module);
 void addRender(py::module_& module);
+void addSplats(py::module_& module);
 
 }  // namespace esvr::python

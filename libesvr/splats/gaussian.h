@@ -1,0 +1,49 @@
+#pragma once
+/// The optics of Gaussians: what a splat and a part of a density have in common. docs/splats.md has the
+/// derivations.
+
+#include <array>
+
+#include "core/geometry.h"
+#include "esvr/ellipsoids.h"
+
+namespace esvr::splats {
+
+using Sizes = std::array<double, 3>;
+
+/// The Gaussian a exp(-|u|^2 / (2 width^2)) that stands for a kernel phi(|u|^2).
+struct KernelGaussian {
+  double
+      width;  ///< its standard deviation, which is that of the kernel along any axis, in units of the scales
+  double volume;  ///< the integral of the kernel over space, in units of the product of the scales
+};
+[[nodiscard]] KernelGaussian gaussianOf(const Kernel& kernel, double kappa);
+
+/// The kernel whose ellipsoids are Gaussians exp(-m), cut where they are below a ten-thousandth.
+[[nodiscard]] Kernel gaussianKernel();
+
+/// The integral of a Gaussian of that kernel over space, in units of the product of its standard deviations:
+/// (2 pi)^1.5, less what the cut takes.
+[[nodiscard]] double gaussianVolume();
+
+/// The mean area of the projections of an ellipsoid along all directions, divided by pi: a quarter of its
+/// surface (Cauchy), and s^2 for a ball of the radius s.
+[[nodiscard]] double meanShadow(Sizes halfAxes);
+
+/// The integral of -ln(1 - alpha exp(-t)) over t from 0 on, which is the dilogarithm of alpha: the optical depth
+/// of a splat, summed over a picture, in units of 2 pi times its shadow. \param alpha  from 0 to 1
+[[nodiscard]] double depthOfAlpha(double alpha);
+
+/// The quaternion of a rotation's matrix, with w >= 0.
+[[nodiscard]] Quaternion quaternionOf(const Matrix3& rotation);
+/// The rotation by b and then by a.
+[[nodiscard]] Quaternion product(const Quaternion& a, const Quaternion& b);
+
+/// The rotation and the sizes of a Gaussian whose standard deviations are the columns of a matrix.
+struct PrincipalGaussian {
+  Quaternion rotation;  ///< unit length, w >= 0
+  Sizes sizes;          ///< decreasing
+};
+[[nodiscard]] PrincipalGaussian principalAxesOf(const Matrix3& columns);
+
+}  // namespace esvr::splats
