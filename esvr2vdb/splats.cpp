@@ -72,6 +72,7 @@ void exportSplats(const Options& options, const EsvrFile& file, const cli::Log& 
   const StoredGrid grid = partOf(file.grids[chooseGrid(options, file)], options);
   SplatOptions wanted = options.splats.made;
   wanted.colors = colorsFor(wanted.colors, grid);
+  wanted.maxBytes = options.memory.maxBytes;
   if (options.output.extension() == ".usda") wanted.form = SplatForm::kUsd;
   const MadeSplats made = makeSplats(grid, wanted);
   tellWhatIsMissing(made, log);

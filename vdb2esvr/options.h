@@ -60,6 +60,11 @@ struct Options {
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
 
+  /// The input as the user named it; splats are read from a file that was made of them.
+  [[nodiscard]] const std::filesystem::path& namedInput() const {
+    return splats ? splats->path : input;
+  }
+
   /// True if an interrupted run writes its best state. A run that is continued later keeps its
   /// finished parts, and a frame that ended early would look as if it were complete.
   [[nodiscard]] bool keepsBest() const { return !resume && !sequence; }

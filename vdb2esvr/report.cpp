@@ -489,7 +489,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
   const Ratio ratio = ratioOf(record);
   Json report = reportHead(options, kSchema);
   report.update({{"input",
-                  {{"path", options.input.string()},
+                  {{"path", options.namedInput().string()},
                    {"format", record.input.format},
                    {"bytes", record.input.fileBytes},
                    {"bytes_converted", ratio.bytesIn}}},
@@ -513,7 +513,7 @@ Json makeReport(const Options& options, const RunRecord& record) {
 
 Json makeFailureReport(const Options& options, const Error& error) {
   Json report = reportHead(options, kSchema);
-  report.update({{"input", {{"path", options.input.string()}}},
+  report.update({{"input", {{"path", options.namedInput().string()}}},
                  {"error", {{"kind", nameOf(error.kind())}, {"message", error.what()}}},
                  {"exit_code", error.exitCode()}});
   return report;
@@ -594,7 +594,7 @@ Json frameReport(Json conversion) {
 Json makeSequenceReport(const Options& options, const SequenceRecord& record) {
   const auto amiss = whatIsAmiss(record);
   Json report = reportHead(options, kSequenceSchema);
-  report.update({{"input", {{"path", options.input.string()}}},
+  report.update({{"input", {{"path", options.namedInput().string()}}},
                  {"output", outputOf(options, record)},
                  {"states", countsOf(record)},
                  {"grids", rangesOf(record)},

@@ -183,7 +183,7 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
   printNotFitted(record, out);
   printShared(record, out);
   const Ratio ratio = ratioOf(record);
-  out << cli::printable(options.input.string());
+  out << cli::printable(options.namedInput().string());
   if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";
   out << ' ' << ratio.bytesIn << " bytes -> " << cli::printable(options.output.string()) << ' '
       << ratio.bytesOut << " bytes, 1 : " << cli::shortNumber(ratio.value()) << '\n';
@@ -292,7 +292,7 @@ void printBytes(const Options& options, const SequenceRecord& record, std::ostre
   const bool hasKept = !framesIn(FrameState::kKept, record).empty();
   // The file has the frames of an earlier run, too, whose input this run did not read.
   if (bytesOut == 0 || (record.file && hasKept)) return;
-  out << cli::printable(options.input.string()) << ' ' << bytesIn << " bytes -> "
+  out << cli::printable(options.namedInput().string()) << ' ' << bytesIn << " bytes -> "
       << cli::printable(options.output.string()) << ' ' << bytesOut
       << " bytes, 1 : " << cli::shortNumber(double(bytesIn) / double(bytesOut)) << '\n';
 }

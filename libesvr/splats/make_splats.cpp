@@ -51,6 +51,15 @@ void requireEllipsoids(const StoredGrid& grid) {
     refuse(grid, "its transform is a frustum, in which ellipsoids have no shape of their own");
 }
 
+/// Ellipsoids of a damaged or hostile file may reach more bricks than can be listed.
+void requireListable(const StoredGrid& grid, std::uint64_t maxBytes) {
+  constexpr double kBytesPerBrick = 2.0 * sizeof(Coord);  // the list grows; voxels are not kept
+  WorkEstimate work = estimateDecode(grid, {.maxBytes = maxBytes});
+  const double bricks = std::exchange(work.bricks, 0.0);
+  requireWithinMemory(work.bytes() + bricks * kBytesPerBrick, maxBytes,
+                      "the splats of grid \"" + shownName(grid.descriptor.name) + "\"");
+}
+
 // The Gaussians of a density, in index space.
 
 /// The ellipsoids of a positive intensity, since no splat takes away from others.
@@ -136,13 +145,16 @@ constexpr double kSampleAt[] = {-1.7320508075688772, 0.0, 1.7320508075688772};
 constexpr float kSampleWeight[] = {1.0f / 6.0f, 2.0f / 3.0f, 1.0f / 6.0f};
 
 void addSamples(const Gaussian& g, std::vector<Place>& places) {
+  constexpr double kFarthest = 0x1p30;  // the index space is larger
   for (const double x : kSampleAt)
     for (const double y : kSampleAt)
       for (const double z : kSampleAt) {
         Place place;
-        for (int r = 0; r < 3; ++r)
-          place[r] = g.center[r] + x * g.columns[3 * r] + y * g.columns[3 * r + 1] +
-                     z * g.columns[3 * r + 2];
+        for (int r = 0; r < 3; ++r) {
+          const double* row = &g.columns[3 * r];
+          place[r] =
+              std::clamp(g.center[r] + x * row[0] + y * row[1] + z * row[2], -kFarthest, kFarthest);
+        }
         places.push_back(place);
       }
 }
@@ -372,12 +384,11 @@ struct Splat {
 /// A splat of a depth tau hides 1 - exp(-tau g) beside its center, where g is a Gaussian, but a reader draws
 /// (1 - exp(-tau)) g, which is less. Several splats at one place, each with a part of the depth, are close to it.
 constexpr double kDeepest = 1.0;
-constexpr double kMostCopies = 16.0;
+constexpr double kMostCopies = 16.0;  // a deeper splat lets nothing through
 
 /// Sets the alpha and the size of a splat. \param depth  its optical depth through the center
 void setAlpha(double depth, Splat& splat) {
   const double copies = std::clamp(std::ceil(depth / kDeepest), 1.0, kMostCopies);
-  splat.isClamped = depth > kMostCopies * kDeepest;
   const double each = std::min(depth / copies, kDeepest), alpha = -std::expm1(-each);
   const AlphaLevel level(alpha);
   splat.alpha = level.written();
@@ -466,6 +477,7 @@ MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options) {
   constexpr std::size_t kBetweenChecks = 4096;
   checkTransferFunction({options.colors, {{0.0, 1.0}}});
   requireEllipsoids(grid);
+  requireListable(grid, options.maxBytes);
   MadeSplats made;
   made.ellipsoids = grid.field.ellipsoidCount();
   SplatScene& scene = made.scene;

@@ -106,6 +106,7 @@ TEST_F(SplatFiles, AreConvertedLikeAVdb) {
   const auto run = vdb2esvr({at("out.ply"), at("out.esvr"), "--voxel-size", "1", "--preset",
                              "draft", "--scratch", folder_.path().string()});
   ASSERT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr(at("out.ply")));
   EXPECT_THAT(namesInOrder(readEsvr(at("out.esvr"))), ElementsAre("density", "Cd"));
   EXPECT_THAT(folder_.names(),
               ElementsAre("in.esvr", "in.vdb", "out.esvr", "out.ply"));  // no scratch is left

@@ -193,6 +193,14 @@ TEST(MakeSplats, SayWhatTheyLeaveOut) {
   EXPECT_THROW((void)makeSplats(grid, whiteIn(SplatForm::kPly, 1e-6)), CannotConvert);
 }
 
+TEST(MakeSplats, RefuseEllipsoidsThatReachTooFarBeforeAnythingIsEvaluated) {
+  StoredGrid grid = gridOf({{0, 0, 0}}, {3e4, 3e4, 3e4});
+  grid.activeBox = {{-40000, -40000, -40000}, {40000, 40000, 40000}};
+  SplatOptions options = whiteIn(SplatForm::kPly, 0.1);
+  options.maxBytes = 1u << 30;
+  EXPECT_THROW((void)makeSplats(grid, options), MemoryExceeded);
+}
+
 TEST(MakeSplats, LetHalfOfTheLightThroughUnlessToldOtherwise) {
   SplatOptions options = whiteIn(SplatForm::kPly, 1.0);
   options.densityScale.reset();

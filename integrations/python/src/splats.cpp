@@ -53,7 +53,8 @@ double writeSplatsOf(const std::filesystem::path& path, const Grid& grid, const 
     const auto made = makeSplats(*grid.grid, {.form = form,
                                               .up = upOf(up),
                                               .colors = colorsOf(colors, *grid.grid),
-                                              .densityScale = densityScale});
+                                              .densityScale = densityScale,
+                                              .maxBytes = usualMemoryLimit()});
     writeSplats(path, made.scene, form, overwrite);
     return made.scene.densityScale;
   });

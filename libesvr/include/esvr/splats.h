@@ -112,6 +112,7 @@ struct SplatOptions {
   /// column of the grid lets half of the light through (medianDepth, metrics.h), or, without such a column,
   /// that with which the largest value hides all but 1/1000 behind the longest side of the box.
   std::optional<double> densityScale{};
+  std::uint64_t maxBytes = kNoMemoryLimit;  ///< limit on the memory of the evaluation
 };
 
 struct MadeSplats {
@@ -121,13 +122,14 @@ struct MadeSplats {
       0;  ///< ellipsoids without a splat, because they take away from the others
   /// The share of the optical depth that is left out, because it is in splats with an alpha below 1/510.
   double faintShare = 0.0;
-  std::uint64_t clamped = 0;  ///< splats whose size or alpha is at a limit of the formats
+  std::uint64_t clamped = 0;  ///< splats whose size is at a limit of the formats
 };
 
 /// Makes splats from the ellipsoids of a grid.
 /// \throws UsageError  the colors have no points; the density scale is not above 0
 /// \throws CannotConvert  the grid holds voxels or a level set, has a background other than 0, no ellipsoid or
 ///                        no affine transform; the text names the way out
+/// \throws MemoryExceeded  the evaluation of its sum needs more than maxBytes; nothing was evaluated
 [[nodiscard]] MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options);
 
 // From splats to grids.
