@@ -157,7 +157,7 @@ void addGoalOptions(cli::po::options_description& options) {
     ("topology", value<std::string>()->value_name("T")->default_value("auto"),
      "how active voxels are stored. auto: by their values, so that voxels that differ from the "
      "background by no more than the error may become inactive; their bounding box stays, and level "
-     "sets keep their band; exact: by their mask, which takes more bytes");
+     "sets keep their band, and vectors their active voxels; exact: by their mask, which takes more bytes");
   // clang-format on
 }
 

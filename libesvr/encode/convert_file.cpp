@@ -50,10 +50,19 @@ void GridConverter::findScales() {
 
 void GridConverter::findScale(std::size_t g) {
   VectorVolume vectors;
-  if (grids_[g].readVector)
-    vectors = grids_[g].readVector().components;
-  else
-    for (std::size_t c = 0; c < kComponents; ++c) vectors[c] = grids_.at(g + c).read().volume;
+  Transform transform;
+  if (grids_[g].readVector) {
+    VectorGrid grid = grids_[g].readVector();
+    transform = std::move(grid.descriptor.transform);
+    vectors = std::move(grid.components);
+  } else {
+    for (std::size_t c = 0; c < kComponents; ++c) {
+      VolumeGrid grid = grids_.at(g + c).read();
+      transform = std::move(grid.descriptor.transform);
+      vectors[c] = std::move(grid.volume);
+    }
+  }
+  sets_.push_back({activeKeyOf(vectors.front()), std::move(transform)});
   const VectorScale scale{peakOfVectors(vectors), valueRangeOfVectors(vectors)};
   for (std::size_t c = 0; c < kComponents; ++c) scales_.at(g + c) = scale;
 }
@@ -84,6 +93,16 @@ const StoredGrid* GridConverter::previousOf(std::size_t g) const {
   for (const StoredGrid& grid : options_.previous.file->grids)
     if (grid.descriptor.name == name && before-- == 0) return &grid;
   return nullptr;
+}
+
+/// True for the components of vectors, and for grids with the active voxels of vectors. A vector is active where any
+/// component is, so that by their values a component would add voxels to it or lose some. The exact set is stored
+/// once for all of these grids, or follows from that of the grid that their voxels refer to.
+bool GridConverter::needsExactSet(std::size_t g, const VolumeGrid& source) const {
+  if (grids_[g].component) return true;
+  return !sets_.empty() &&
+         std::ranges::find(sets_, ActiveSet{activeKeyOf(source.volume),
+                                            source.descriptor.transform}) != sets_.end();
 }
 
 /// True if the same grid of the previous frame was made from the same source.
@@ -143,6 +162,8 @@ void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish&
   options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
   if (scales_[g].peak) options.fit.peak = scales_[g].peak;
   if (grids_[g].component) options.measure = Measure::kValues;
+  // With a size, every grid uses its own bytes for its values.
+  if (!wish.bytes && needsExactSet(g, source)) options.storage.activity = Activity::kExact;
   const StoredGrid* const previous = previousOf(g);
   options.previous = wish.expected ? wish.expected : previous;
   if (!wish.expected && isAsBefore(previous, source, made.key)) {

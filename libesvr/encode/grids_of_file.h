@@ -19,6 +19,9 @@ struct Wish {
   const StoredGrid* expected = nullptr;
 };
 
+/// A hash of the active voxels of a volume, whatever their values. (references.cpp)
+[[nodiscard]] InputKey activeKeyOf(const SparseVolume& volume);
+
 /// Reads and converts single grids of a file.
 class GridConverter {
  public:
@@ -30,7 +33,7 @@ class GridConverter {
   /// Runs a step of a conversion that is alone.
   void step(std::size_t g, const std::function<void()>& run);
 
-  /// Reads vectors for the peak and the range of their components.
+  /// Reads vectors for the peak and the range of their components, and for their active voxels.
   void findScales();
 
   [[nodiscard]] VolumeGrid read(std::size_t g) const { return grids_[g].read(); }
@@ -54,6 +57,13 @@ class GridConverter {
     std::optional<double> peak, range;
   };
 
+  /// The active voxels of vectors, and where they are.
+  struct ActiveSet {
+    InputKey voxels;
+    Transform transform;
+    friend bool operator==(const ActiveSet&, const ActiveSet&) = default;
+  };
+
   void step(const GridStep& step) const;
   void findScale(std::size_t g);
   [[nodiscard]] Goal resolvedGoal(std::size_t g) const;
@@ -61,6 +71,7 @@ class GridConverter {
                                               const FitOptions& fit) const;
   void convert(std::size_t g, const VolumeGrid& source, const Wish& wish, ConvertOptions options,
                GridConversion& made) const;
+  [[nodiscard]] bool needsExactSet(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] bool isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
                                 const SourceKey& key) const;
 
@@ -68,6 +79,7 @@ class GridConverter {
   const FileOptions& options_;
   FitOptions fit_;  ///< whose device may change
   std::vector<VectorScale> scales_;
+  std::vector<ActiveSet> sets_;  ///< of the vectors of the file
 };
 
 /// Chooses for each grid of voxels another grid of the file that its voxels refer to, where that takes fewer

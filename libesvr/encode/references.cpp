@@ -12,6 +12,7 @@
 #include "codec/brick_coder.h"
 #include "codec/voxel_values.h"
 #include "core/parallel.h"
+#include "encode/grids_of_file.h"
 #include "esvr/encode.h"
 #include "format/bytes.h"
 #include "format/predicted_sections.h"
@@ -230,6 +231,21 @@ void putVolume(format::ByteWriter& out, const SparseVolume& volume) {
 }
 
 }  // namespace
+
+InputKey encode::activeKeyOf(const SparseVolume& volume) {
+  std::vector<Coord> corners;
+  std::vector<BrickMask> masks;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    corners.push_back(volume.brickCorner(b));
+    masks.push_back(volume.active[b]);
+  }
+  format::ByteWriter out;
+  putHash(out, corners);
+  putHash(out, masks);
+  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
+  return {hash.low64, hash.high64};
+}
 
 InputKey keyOf(const ConvertInput& input) {
   format::ByteWriter out;

@@ -241,7 +241,7 @@ INSTANTIATE_TEST_SUITE_P(
         test::Refusal{{"--skip", "points", "--keep", "points"}, 2, "--keep both name"},
         test::Refusal{{"--keep", "fuel"}, 3, "no grid \"fuel\""},
         test::Refusal{{"--skip", "fuel"}, 3, "no grid \"fuel\""},
-        test::Refusal{{"--size", "1500B"}, 2, "--skip leaves them out"},
+        test::Refusal{{"--size", "1500B"}, 2, "to skip some makes room"},
         test::Refusal{{"--skip", "bool", "--skip", "int32", "--skip", "vec3s", "--skip", "points",
                        "--skip", "density[0]", "--skip", "density[1]", "--skip", "empty"},
                       3,

@@ -9,8 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "encode/volumes.h"
@@ -120,8 +122,8 @@ TEST(ConvertGrids, ConvertsGridsApartThatDifferInAVoxelInTheirClassOrInTheirGoal
     if (value > 0.9f) value += 1e-6f;
   FileSource file = fileOf({{"a", ball}, {"b", other}, {"c", band}, {"e", ball}, {"f", ball}});
   file.grids.push_back(sourceOf("d", band, 5, GridClass::kLevelSet));
-  file.grids[3].goal = PsnrGoal{30.0};
-  EXPECT_THAT(twinsIn(file, fileOptions(PsnrGoal{kStandardPsnr})),
+  file.grids[3].goal = BoundGoal{.bound = 0.01};
+  EXPECT_THAT(twinsIn(file, fileOptions(LosslessGoal{})),
               ElementsAre(std::nullopt, std::nullopt, std::nullopt, std::nullopt, std::size_t{0},
                           std::nullopt));
 }
@@ -190,15 +192,12 @@ TEST(ConvertGridsToSize, KeepsToItWhereTwinsHaveManySections) {
 }
 
 TEST(ConvertGridsToSize, RefusesWhatLeavesNothingForTheGrids) {
-  FileSource file = fileOf({{"density", softBall({}, 1.0f)}});
-  std::string note;
-  for (unsigned i = 0; i < 2000; ++i) note += char('!' + (i * 2654435761u >> 20) % 90);
-  file.metadata = {stringItem("note", note)};
+  const FileSource file = fileOf({{"density", softBall({}, 1.0f)}});
   try {
-    (void)convertGrids(file, sizedOptions(1000));
+    (void)convertGrids(file, sizedOptions(40));  // the header takes more
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("without any fitted grid; the size allows 1000"));
+    EXPECT_THAT(error.what(), HasSubstr("without any fitted grid; the size allows 40"));
   }
 }
 
@@ -242,6 +241,88 @@ TEST(ConvertGrids, GivesTheComponentsOfVectorsOneScale) {
     worst = std::max(worst, error);
   }
   EXPECT_GT(worst, 0.5 * bound);  // that of the smallest component alone would be a sixth of it
+}
+
+/// Vectors whose components are 0 or small in different parts of the ball, and a density with the same active voxels.
+FileSource movingSmoke() {
+  const SparseVolume ball = softBall({}, 1.0f);
+  const auto swirl = [&](float x, float y, float z) {
+    SparseVolume component = ball;
+    for (std::size_t b = 0; b < ball.brickCount(); ++b)
+      for (int v = 0; v < kBrickVoxels; ++v) {
+        const Coord at = ball.brickCorner(b) + voxelLocal(v);
+        float& value = component.brickValues(b)[std::size_t(v)];
+        if (ball.active[b].test(v))
+          value *= std::max(0.0f, x * float(at.x) + y * float(at.y) + z * float(at.z) - 20.0f);
+      }
+    return component;
+  };
+  FileSource file = fileOf({{"density", ball}, {"other", softBall({1, 0, 0}, 1.0f)}});
+  addVectors("wind", {swirl(1, 0, 0.2f), swirl(0, 1, 0.5f), swirl(1, -1, 1)}, file);
+  return file;
+}
+
+TEST(ConvertGrids, GivesVectorsAndGridsWithTheirActiveVoxelsTheSetOfTheSource) {
+  const FileSource file = movingSmoke();
+  for (const auto representation : {Representation::kVoxels, Representation::kEllipsoids}) {
+    const ConvertedFile made = convertGrids(file, fileOptions(PresetGoal{}, representation));
+    for (const std::size_t g : {0, 2, 3, 4})
+      EXPECT_EQ(compareVolumes(file.grids[g].read().volume, decodeGrid(made.file.grids[g])).iou,
+                1.0);
+    const SparseVolume other = file.grids[1].read().volume;
+    EXPECT_LT(compareVolumes(other, decodeGrid(made.file.grids[1])).iou, 1.0);
+  }
+}
+
+TEST(ConvertGrids, StoresTheSetOfSeveralGridsOnce) {
+  const ConvertedFile made =
+      convertGrids(movingSmoke(), fileOptions(PresetGoal{}, Representation::kEllipsoids));
+  int masks = 0, stored = 0;
+  for (const SectionSummary& section : inspectEsvr(encodeEsvr(made.file), "file").sections) {
+    if (section.kind != "mask") continue;
+    ++masks;
+    stored += section.sharedWith ? 0 : 1;
+  }
+  EXPECT_EQ(masks, 4);
+  EXPECT_EQ(stored, 1);
+}
+
+/// The share of a colour where the density is 2 to 5 % of its maximum is off by as much as the values of the
+/// faint colours are, whichever voxels are active (docs/lab-notes.md, "Active voxels"). The bound is the mean of
+/// 0.088 that was measured, and half as much again.
+TEST(ConvertGrids, KeepsTheHueOfFaintSmoke) {
+  const SparseVolume density = softBall({}, 1.0f, 16.0);
+  const auto coloured = [&](const std::function<float(Coord)>& share) {
+    SparseVolume colour = density;
+    for (std::size_t b = 0; b < density.brickCount(); ++b)
+      for (int v = 0; v < kBrickVoxels; ++v)
+        colour.brickValues(b)[std::size_t(v)] *= share(density.brickCorner(b) + voxelLocal(v));
+    return colour;
+  };
+  const auto redAt = [](Coord v) { return 0.2f + 0.015f * float(v.x); };
+  const std::array colours{coloured(redAt), coloured([&](Coord v) { return 1.0f - redAt(v); })};
+  FileOptions options = fileOptions(PresetGoal{});
+  options.convert.measure = Measure::kAuto;
+  const ConvertedFile made = convertGrids(
+      fileOf({{"density", density}, {"red", colours[0]}, {"blue", colours[1]}}), options);
+  const SparseVolume red = decodeGrid(made.file.grids[1]), blue = decodeGrid(made.file.grids[2]);
+  const auto valueIn = [](const SparseVolume& volume, Coord voxel) {
+    const auto b = findBrick(volume, brickOf(voxel - volume.origin));
+    return b ? volume.brickValues(*b)[std::size_t(voxelOffset(localOf(voxel)))] : 0.0f;
+  };
+  double shift = 0.0;
+  int faint = 0;
+  for (std::size_t b = 0; b < density.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const float value = density.brickValues(b)[std::size_t(v)];
+      if (value < 0.02f || value > 0.05f) continue;
+      const Coord voxel = density.brickCorner(b) + voxelLocal(v);
+      const double r = valueIn(red, voxel), sum = r + valueIn(blue, voxel);
+      shift += std::abs((sum > 0.0 ? r / sum : 0.5) - double(redAt(voxel)));
+      ++faint;
+    }
+  ASSERT_GT(faint, 500);
+  EXPECT_LT(shift / faint, 0.13);
 }
 
 TEST(ConvertGrids, CarriesEachVectorThatIsSmallerUnchanged) {
@@ -318,6 +399,7 @@ TEST(ConvertGrids, GivesTheSameFileAtTheSameTimeAndOneAfterTheOther) {
   FileSource file = fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({5, 0, 0}, 1.0f, 4.0)}});
   addVectors("wind", wind(), file);
   FileOptions options = fileOptions(PresetGoal{}, Representation::kAuto);
+  options.convert.effort = kLeastEffort;
   const auto together = encodeEsvr(convertGrids(file, options).file);
   options.severalAtOnce = false;
   EXPECT_EQ(together, encodeEsvr(convertGrids(file, options).file));
