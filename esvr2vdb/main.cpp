@@ -124,6 +124,8 @@ cli::CommandLine commandLine() {
   cli::addSplatInput(line.options());
   cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
+  line.mainOptions({"list", "check", "grid", "lod", "bbox", "reference", "colors", "voxel-size",
+                    "force", "frames"});
   return line;
 }
 

@@ -113,30 +113,37 @@ void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
 
 }  // namespace
 
+namespace {
+
+/// \param palette  its values; empty: there is none
+VoxelLayer exactLayerOf(const SparseVolume& volume, std::vector<float> palette) {
+  VoxelLayer layer;
+  layer.form = !palette.empty()    ? VoxelForm::kPalette
+               : allHalves(volume) ? VoxelForm::kHalf
+                                   : VoxelForm::kFloat;
+  layer.palette = std::move(palette);
+  fill(volume, RoundedSigns::kMayChange, layer);
+  return layer;
+}
+
+std::uint64_t codedBytes(const VoxelLayer& layer) {
+  return codec::codeWithin(codec::chooseModel(layer), UINT64_MAX, layer).bytes +
+         layer.palette.size() * sizeof(float);
+}
+
+}  // namespace
+
 VoxelLayer exactLayer(const SparseVolume& volume) {
-  const auto layerOf = [&](VoxelForm form, std::vector<float> palette = {}) {
-    VoxelLayer layer;
-    layer.form = form;
-    layer.palette = std::move(palette);
-    fill(volume, RoundedSigns::kMayChange, layer);
-    return layer;
-  };
-  const auto bytesOf = [](const VoxelLayer& layer) {
-    return codec::codeWithin(codec::chooseModel(layer), UINT64_MAX, layer).bytes +
-           layer.palette.size() * sizeof(float);
-  };
-  std::vector<float> palette = paletteOf(volume);
-  const auto direct = [&] {
-    return layerOf(allHalves(volume) ? VoxelForm::kHalf : VoxelForm::kFloat);
-  };
-  if (palette.empty()) return direct();
-  // The values of a palette take four bytes each. Where each of them is that of many voxels, a palette saves more.
+  return exactLayerOf(volume, paletteOf(volume));
+}
+
+VoxelLayer smallestExactLayer(const SparseVolume& volume) {
+  VoxelLayer layer = exactLayer(volume);
+  // A value of a palette takes four bytes. Where it is that of many voxels, a palette saves more.
   constexpr std::uint64_t kVoxelsOfAValue = 64;
-  const bool isRepaid = palette.size() * kVoxelsOfAValue <= activeVoxelCount(volume);
-  VoxelLayer indexed = layerOf(VoxelForm::kPalette, std::move(palette));
-  if (isRepaid) return indexed;
-  VoxelLayer plain = direct();
-  return bytesOf(plain) < bytesOf(indexed) ? plain : indexed;
+  if (layer.palette.size() * kVoxelsOfAValue <= activeVoxelCount(volume)) return layer;
+  VoxelLayer direct = exactLayerOf(volume, {});
+  return codedBytes(direct) < codedBytes(layer) ? direct : layer;
 }
 
 // ---- Layers within a bound

@@ -201,8 +201,7 @@ constexpr std::uint64_t kRefillDivisor = 100;
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kNarrowestLoss = 0.01,
                  kPsnrSpare = 0.12;
 constexpr int kMostRoundings = 4;
-/// Factor by which a whole fit may be expected to gain more than one of 400 iterations over one of 100, unless many
-/// voxels saturate (dragon has 200 iterations, and gains as much).
+/// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
 constexpr double kMostBehind = 2.5;
 /// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
 constexpr double kMinSlopeRatio = 1.15, kMinSlope = kDbPerDoubling / 2.0;
@@ -372,17 +371,18 @@ double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded
 
 // ---- Short fits
 
-/// Quality of a whole fit less that of a short one, dB. The error that iterations leave falls with their number.
+/// Quality of a whole fit less that of a short one, dB.
 double EllipsoidSearch::behind() const {
-  const double usual = isToned(job_) ? kTuning.tonedShortFitBehind
-                       : saturates_  ? kTuning.shortFitBehindSaturated
-                                     : kTuning.shortFitBehind;
+  const double whole = plan_.wholeIterations, brief = plan_.shortIterations;
+  if (!isToned(job_)) {
+    const double usual = saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind;
+    return usual * std::clamp(0.5 * std::log2(whole / brief), 0.0, 1.0);
+  }
+  // The error that iterations leave falls with their number: the plume of 256 has 168 and 42 of them.
   const auto gain = [](double from, double to) { return 1.0 / from - 1.0 / to; };
-  const double wholeLength = plan_.wholeIterations, shortLength = plan_.shortIterations;
-  const double most = saturates_ ? 1.0 : kMostBehind;
-  return usual * std::min(gain(shortLength, wholeLength) /
-                              gain(kTuning.mostShortIterations, 4.0 * kTuning.mostShortIterations),
-                          most);
+  const double most = kTuning.mostShortIterations;
+  return kTuning.tonedShortFitBehind *
+         std::min(gain(brief, whole) / gain(most, 4.0 * most), kMostBehind);
 }
 
 double EllipsoidSearch::aim() const { return *goal_.psnr + margin_.aim; }

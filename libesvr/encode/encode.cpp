@@ -315,7 +315,7 @@ class Converter {
   Conversion operator()(const BoundGoal& goal) const {
     const SparseVolume& source = job_.input.source;
     const double bound = absoluteBound(goal, source);
-    if (bound == 0.0) return asVoxels(exactLayer(source));
+    if (bound == 0.0) return asVoxels(smallestExactLayer(source));
     return orExact(asVoxels(
         boundedLayer(source, bound, voxelActivity(job_), voxelSigns(job_), decodedValues(job_))));
   }
@@ -334,7 +334,7 @@ class Converter {
           "grid '" + shownName(job_.input.descriptor.name) +
           "' has values of type double, which are read as float32; a lossless grid cannot hold "
           "them; choose a bound or a PSNR instead");
-    return asVoxels(exactLayer(job_.input.source));
+    return asVoxels(smallestExactLayer(job_.input.source));
   }
 
  private:

@@ -116,9 +116,10 @@ double Judge::massFactor(double wanted, const SparseVolume& decoded) const {
 double keepMass(const Job& job, StoredGrid& grid) {
   const auto decoded = [&] { return decodeGrid(grid, {.memory = memoryOf(job.input.source)}); };
   if (!seesPictures(job) || grid.quantised.empty()) return psnrOf(job, decoded());
-  // Decoded sums are clamped to the range of the source, so that a factor far from 1 is found in two steps.
-  constexpr int kMostSteps = 2;
-  constexpr double kFar = 0.005;
+  // Decoded sums are clamped to the range of the source, so that a step may miss a third of what it corrects. A factor that
+  // is nearer to 1 than kFar leaves an error of less than a thousandth.
+  constexpr int kMostSteps = 4;
+  constexpr double kFar = 0.002;
   const double wanted = job.judge->massOf(job.input.source);
   for (int step = 1;; ++step) {
     SparseVolume tones = decoded();
@@ -263,7 +264,7 @@ SparseVolume decodedTones(const VoxelLayer& layer, ToneCurve tone, const ValueRa
 RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal) {
   const SparseVolume& source = job.input.source;
   const double least = leastMagnitude(source);
-  if (!std::isfinite(least)) return {exactLayer(source), {}};
+  if (!std::isfinite(least)) return {smallestExactLayer(source), {}};
   double floor = goal.floor.value_or(least);
   if (source.background != 0.0f)
     return {boundedLayer(source, goal.share * std::max(floor, leastOf(source)), voxelActivity(job),
@@ -276,7 +277,7 @@ RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal) {
   ToneCurve tone{float(floor)};
   if (double(tone.scale) > floor) tone.scale = std::nextafter(tone.scale, 0.0f);
   floor = tone.scale;
-  if (!(floor > 0.0)) return {exactLayer(source), {}};
+  if (!(floor > 0.0)) return {smallestExactLayer(source), {}};
   // A step of u moves a value by step sqrt(v^2 + floor^2), which is the largest share of
   // max(v, floor) at the floor. There, the half step takes it to floor (1 + share).
   const SparseVolume tones = tonesOf(source, tone);
@@ -293,7 +294,7 @@ RelativeLayer relativeLayer(const Job& job, const RelativeBoundGoal& goal) {
     if (largestRelativeError(source, decoded, floor).share <= goal.share)
       return {std::move(layer), tone};
   }
-  return {exactLayer(source), {}};
+  return {smallestExactLayer(source), {}};
 }
 
 void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded,

@@ -127,7 +127,7 @@ std::uint64_t bytesBeside(const Job& job) {
 
 /// The bytes of exact voxels of a volume, from those of a sample.
 std::uint64_t exactBytesOf(const SparseVolume& sample, const SparseVolume& whole) {
-  const VoxelLayer layer = exactLayer(sample);
+  const VoxelLayer layer = smallestExactLayer(sample);
   const double bound = spanOf(whole).length() * 0x1p-14;
   const bool isWhole = sample.brickCount() == whole.brickCount() || !(bound > 0.0);
   const double share = isWhole ? double(sample.brickCount()) / double(whole.brickCount())
@@ -193,7 +193,7 @@ VoxelCandidate exactCandidate(const Job& job, VoxelLayer exact) {
 
 VoxelCandidate exactVoxels(const Job& job) {
   VoxelCandidate made;
-  made.seconds = secondsOf([&] { made = exactCandidate(job, exactLayer(valuesOf(job))); });
+  made.seconds = secondsOf([&] { made = exactCandidate(job, smallestExactLayer(valuesOf(job))); });
   return made;
 }
 
@@ -209,7 +209,7 @@ std::optional<VoxelCandidate> smallerExactVoxels(const Job& job, const StoredGri
       bits += std::log2(1.0 + std::abs(double(codes[v]) - codes[v - 1]));
     active += double(layer.active[b].count());
   }
-  VoxelLayer exactCodes = exactLayer(valuesOf(job));
+  VoxelLayer exactCodes = smallestExactLayer(valuesOf(job));
   if (bits / active < leastBitsOfExact(exactCodes.form) - kBetterPrediction) return std::nullopt;
   VoxelCandidate exact = exactCandidate(job, std::move(exactCodes));
   if (exact.bytes > bytesInFrame(quantised, job.options.previous)) return std::nullopt;
@@ -374,7 +374,7 @@ void VoxelSearch::tryForPsnr() {
   }
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
-  if (bits >= leastBitsOfExact(exactLayer(tryOn_).form))
+  if (bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
     exact_ = job_.options.previous ? exactVoxels(job_).bytes : exactBytes();
 }
 

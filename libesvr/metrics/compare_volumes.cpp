@@ -231,7 +231,6 @@ double leastMagnitude(const SparseVolume& volume) {
 
 RelativeError largestRelativeError(const SparseVolume& reference, const SparseVolume& candidate,
                                    std::optional<double> floor) {
-  using Range = tbb::blocked_range<std::size_t>;
   const double least = floor ? *floor : leastMagnitude(reference);
   const auto pairs = metrics::pairBricks(reference, candidate);
   const auto errorAt = [&](const BrickPair& pair, int v) {
@@ -245,8 +244,8 @@ RelativeError largestRelativeError(const SparseVolume& reference, const SparseVo
     return b.share > a.share ? b : a;
   };
   return parallelDeterministicReduce(
-      Range(0, pairs.size()), RelativeError{},
-      [&](const Range& range, RelativeError largest) {
+      tbb::blocked_range<std::size_t>(0, pairs.size()), RelativeError{},
+      [&](const auto& range, RelativeError largest) {
         for (std::size_t i = range.begin(); i != range.end(); ++i)
           for (int v = 0; v < kBrickVoxels; ++v) largest = larger(largest, errorAt(pairs[i], v));
         return largest;

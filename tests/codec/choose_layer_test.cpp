@@ -60,13 +60,18 @@ TEST(ExactLayer, HoldsHalvesAsHalves) {
               VoxelForm::kHalf);
 }
 
-// 4,096 voxels of about 2,300 values: a palette of them would take 9,200 bytes, and all halves take 8,192.
+// 4,096 voxels of about 2,300 values: a palette of them takes 9,200 bytes, and all halves take 8,192.
 TEST(ExactLayer, HasNoPaletteThatTakesMoreThanItSaves) {
   test::Random random(11);
-  expectExact(
-      test::volumeOf({}, 2, 1.0f,
-                     [&](Coord) { return codec::nearestHalf(float(random(0.0, 60000.0))); }),
-      VoxelForm::kHalf);
+  const SparseVolume volume = test::volumeOf(
+      {}, 2, 1.0f, [&](Coord) { return codec::nearestHalf(float(random(0.0, 60000.0))); });
+  EXPECT_EQ(exactLayer(volume).form, VoxelForm::kPalette);
+  const VoxelLayer smallest = smallestExactLayer(volume);
+  EXPECT_EQ(smallest.form, VoxelForm::kHalf);
+  EXPECT_EQ(largestError(volume, smallest), 0.0);
+  EXPECT_LT(format::putVoxels(smallest).size(), format::putVoxels(exactLayer(volume)).size());
+  const SparseVolume few = test::volumeOf({}, 2, 1.0f, [](Coord v) { return float(v.x % 3); });
+  EXPECT_EQ(smallestExactLayer(few).form, VoxelForm::kPalette);
 }
 
 TEST(ExactLayer, HoldsAnyFloat) {
@@ -87,7 +92,7 @@ TEST(ExactLayer, KeepsActiveBackgroundAndInactiveValues) {
     volume.active[b] = {};
     volume.active[b].set(int(b) % kBrickVoxels);
   }
-  expectExact(volume, VoxelForm::kFloat);
+  expectExact(volume, VoxelForm::kPalette);
 }
 
 TEST(BoundedLayer, KeepsSignsWithinItsBoundIfAsked) {

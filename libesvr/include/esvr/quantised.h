@@ -143,6 +143,9 @@ struct VoxelLayer {
 /// floats can hold all values, else kFloat.
 [[nodiscard]] VoxelLayer exactLayer(const SparseVolume& volume);
 
+/// The same, without a palette where it would take more bytes than it saves.
+[[nodiscard]] VoxelLayer smallestExactLayer(const SparseVolume& volume);
+
 /// How a stored grid says which voxels are active. Either way, the active bounding box stays that of the
 /// source: no voxel outside it becomes active, and each of its faces keeps an active voxel.
 enum class Activity {
