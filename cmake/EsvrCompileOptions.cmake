@@ -19,8 +19,7 @@ if(ESVR_WERROR)
 endif()
 
 if(ESVR_SANITIZE)
-  set(sanitize -fsanitize=${ESVR_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
-               -D_GLIBCXX_ASSERTIONS)
+  set(sanitize -fsanitize=${ESVR_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
     list(APPEND sanitize -fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/sanitizer_ignorelist.txt)
   endif()
