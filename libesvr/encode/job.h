@@ -61,7 +61,7 @@ struct Plan {
 [[nodiscard]] Plan planOf(const Job& job);
 
 /// The number by which an effort multiplies the iterations of a fit: 1.6 for each step from the usual one. Three
-/// steps below, smoke1 takes 8 % more bytes in 0.6 times the seconds; with fewer iterations, both become more.
+/// steps below, smoke1 takes 11 % more bytes in half of the seconds; with fewer iterations, both become more.
 [[nodiscard]] double effortFactor(int effort);
 
 }  // namespace esvr::encode
