@@ -44,7 +44,7 @@ struct CheckOptions {
   /// Grids that are not compared, and that only one of the files may have.
   std::set<std::string> ignored;
   std::array<std::optional<cli::ErrorBound>, kFigureCount> limits;
-  std::optional<double> relativeFloor;  ///< of the limit on the relative error
+  std::optional<double> relativeFloor;  ///< the floor of the limit on the relative error
   std::optional<std::uint64_t> maxBytes;
   std::set<DifferenceKind> failOn;
   std::optional<std::filesystem::path> baseline;

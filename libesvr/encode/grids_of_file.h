@@ -13,7 +13,7 @@ namespace esvr::encode {
 
 /// What one conversion of a grid is to give.
 struct Wish {
-  std::optional<std::uint64_t> bytes{};  ///< that it may add
+  std::optional<std::uint64_t> bytes{};  ///< bytes that it may add to the file
   /// A grid that is like this one and that its voxels are to refer to; null: the same grid of the previous
   /// frame, if there is one.
   const StoredGrid* expected = nullptr;
@@ -77,9 +77,9 @@ class GridConverter {
 
   const std::vector<GridSource>& grids_;
   const FileOptions& options_;
-  FitOptions fit_;  ///< whose device may change
+  FitOptions fit_;  ///< options of the fits; their device may change
   std::vector<VectorScale> scales_;
-  std::vector<ActiveSet> sets_;  ///< of the vectors of the file
+  std::vector<ActiveSet> sets_;  ///< the active voxels of the vectors of the file
 };
 
 /// Chooses for each grid of voxels another grid of the file that its voxels refer to, where that takes fewer

@@ -114,7 +114,7 @@ class VoxelSearch {
   const SparseVolume& tryOn_;  ///< the sample, or the volume
   double share_ = 1.0;         ///< bricks of the sample per brick of the volume
   double mass_ = 0.0,
-         sampleMass_ = 0.0;  ///< of the whole volume and of the sample, where it is kept
+         sampleMass_ = 0.0;  ///< masses of the whole volume and of the sample, if kept
   double judged_ = 0.0;      ///< quality by the judge less the PSNR over the box, dB, for a sample
   double range_ = 0.0;       ///< span of the values; 0 for a volume of one value
   std::uint64_t besides_ = 0;  ///< bytes of a grid without its voxels
