@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <unordered_set>
@@ -67,33 +69,83 @@ bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
-/// The distinct values of a volume in increasing order; empty if there are too many for a palette.
-std::vector<float> paletteOf(const SparseVolume& volume) {
+/// The numbers of the distinct values of bricks in increasing order; one more than kLargestPalette if there are more.
+std::vector<std::int32_t> ordersOf(const SparseVolume& volume,
+                                   const tbb::blocked_range<std::size_t>& bricks) {
   std::unordered_set<std::int32_t> orders;
   std::optional<std::int32_t> last;
-  for (const float v : volume.values) {
-    const std::int32_t order = codec::orderOfFloat(v);
-    if (last == order) continue;
-    orders.insert(*(last = order));
-    if (orders.size() > kLargestPalette) return {};
-  }
+  for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
+    for (const float v : volume.brickValues(b)) {
+      const std::int32_t order = codec::orderOfFloat(v);
+      if (last == order) continue;
+      orders.insert(*(last = order));
+      if (orders.size() > kLargestPalette) break;
+    }
+  std::vector<std::int32_t> sorted(orders.begin(), orders.end());
+  std::sort(sorted.begin(), sorted.end());
+  return sorted;
+}
+
+/// The distinct values of a volume in increasing order; empty if there are too many for a palette.
+std::vector<float> paletteOf(const SparseVolume& volume) {
+  using Orders = std::vector<std::int32_t>;
+  using Range = tbb::blocked_range<std::size_t>;
+  const auto joined = [](const Orders& a, const Orders& b) {
+    Orders both;
+    std::ranges::set_union(a, b, std::back_inserter(both));
+    return both;
+  };
+  const Orders orders = parallelReduce(
+      Range(0, volume.brickCount()), Orders{},
+      [&](const Range& bricks, const Orders& before) {
+        return before.size() > kLargestPalette ? before : joined(before, ordersOf(volume, bricks));
+      },
+      joined);
+  if (orders.size() > kLargestPalette) return {};
   std::vector<float> values;
   for (const std::int32_t order : orders) values.push_back(codec::floatAt(order));
-  std::sort(values.begin(), values.end(), codec::inOrder);
   return values;
 }
 
 bool allHalves(const SparseVolume& volume) {
-  return std::all_of(volume.values.begin(), volume.values.end(),
-                     [](float v) { return sameBits(codec::halfAt(codec::orderOfHalf(v)), v); });
+  using Range = tbb::blocked_range<std::size_t>;
+  return parallelReduce(
+      Range(0, volume.brickCount()), true,
+      [&](const Range& bricks, bool all) {
+        for (std::size_t b = bricks.begin(); all && b != bricks.end(); ++b)
+          all = std::ranges::all_of(volume.brickValues(b), [](float v) {
+            return sameBits(codec::halfAt(codec::orderOfHalf(v)), v);
+          });
+        return all;
+      },
+      std::logical_and<>());
 }
 
-/// The code of a value. With kKept, the code of a negative value is negative.
-std::int32_t roundedCode(const VoxelLayer& layer, float value, RoundedSigns signs) {
-  const std::int32_t code = codec::codeOfValue(layer, value);
-  return signs == RoundedSigns::kKept && value < 0.0f ? std::min(code, -1) : code;
+/// The voxels of a brick that differ from the background by more than a bound.
+BrickMask differing(std::span<const float> values, float background, double bound) {
+  BrickMask mask;
+  for (std::size_t w = 0; w < mask.words.size(); ++w) {
+    std::uint64_t word = 0;
+    for (std::size_t bit = 0; bit < 64; ++bit)
+      word |= std::uint64_t{std::abs(double(values[w * 64 + bit]) - background) > bound} << bit;
+    mask.words[w] = word;
+  }
+  return mask;
 }
 
+/// The inactive voxels of a brick that have the background, bit by bit.
+BrickMask vacantOf(std::span<const float> values, float background, const BrickMask& active) {
+  BrickMask mask;
+  for (std::size_t w = 0; w < mask.words.size(); ++w) {
+    std::uint64_t word = 0;
+    for (std::size_t bit = 0; active.words[w] != ~std::uint64_t{0} && bit < 64; ++bit)
+      word |= std::uint64_t{sameBits(values[w * 64 + bit], background)} << bit;
+    mask.words[w] = word & ~active.words[w];
+  }
+  return mask;
+}
+
+/// Codes all voxels of a volume. With kKept, the code of a negative value is negative.
 void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
   layer.origin = volume.origin;
   layer.background = volume.background;
@@ -103,11 +155,12 @@ void fill(const SparseVolume& volume, RoundedSigns signs, VoxelLayer& layer) {
   layer.codes = VoxelArray<std::int32_t>(volume.values.size(), memoryOf(volume));
   parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
     const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (!volume.active[b].test(v) && sameBits(values[v], volume.background))
-        layer.vacant[b].set(v);
-      layer.codes[b * kBrickVoxels + std::size_t(v)] = roundedCode(layer, values[v], signs);
-    }
+    const std::span codes(&layer.codes[b * kBrickVoxels], std::size_t(kBrickVoxels));
+    layer.vacant[b] = vacantOf(values, volume.background, volume.active[b]);
+    codec::codesOfValues(layer, values, codes);
+    if (signs == RoundedSigns::kKept)
+      for (std::size_t v = 0; v < codes.size(); ++v)
+        codes[v] = values[v] < 0.0f ? std::min(codes[v], -1) : codes[v];
   });
 }
 
@@ -153,9 +206,16 @@ namespace {
 constexpr double kMargin = 1.0 - 1e-6;  // factor of a bound, which leaves room for rounding
 
 double largestMagnitude(const SparseVolume& volume) {
-  double largest = 0.0;
-  for (const float v : volume.values) largest = std::max(largest, std::abs(double(v)));
-  return largest;
+  using Range = tbb::blocked_range<std::size_t>;
+  const auto larger = [](float a, float b) { return std::max(a, b); };
+  return parallelReduce(
+      Range(0, volume.brickCount()), 0.0f,
+      [&](const Range& bricks, float largest) {
+        for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
+          for (const float v : volume.brickValues(b)) largest = larger(largest, std::abs(v));
+        return largest;
+      },
+      larger);
 }
 
 /// The largest error that rounding the values of a quantisation lattice to float32 adds.
@@ -196,12 +256,12 @@ void dropVacant(VoxelLayer& layer) {
   std::size_t kept = 0;
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
     if (layer.vacant[b].count() == kBrickVoxels) continue;
-    layer.bricks[kept] = layer.bricks[b];
-    layer.active[kept] = layer.active[b];
-    layer.vacant[kept] = layer.vacant[b];
-    const auto from = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
-    std::copy_n(from, kBrickVoxels, layer.codes.begin() + std::ptrdiff_t(kept * kBrickVoxels));
-    ++kept;
+    const std::size_t to = kept++;
+    if (to == b) continue;
+    layer.bricks[to] = layer.bricks[b];
+    layer.active[to] = layer.active[b];
+    layer.vacant[to] = layer.vacant[b];
+    std::copy_n(&layer.codes[b * kBrickVoxels], kBrickVoxels, &layer.codes[to * kBrickVoxels]);
   }
   layer.bricks.resize(kept);
   layer.active.resize(kept);
@@ -209,25 +269,13 @@ void dropVacant(VoxelLayer& layer) {
   layer.codes.resize(kept * kBrickVoxels);
 }
 
-/// The voxels that differ from the background by more than a bound.
-std::vector<BrickMask> differing(const SparseVolume& volume, double bound) {
-  std::vector<BrickMask> masks(volume.brickCount());
-  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    const auto values = volume.brickValues(b);
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (std::abs(double(values[v]) - volume.background) > bound) masks[b].set(v);
-  });
-  return masks;
-}
-
-/// Makes all voxels outside a box inactive.
-void clip(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
-  parallelFor(std::size_t{0}, masks.size(), [&](std::size_t b) {
-    const BrickMask all = masks[b];
-    masks[b] = {};
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (all.test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v))) masks[b].set(v);
-  });
+/// Clears the voxels of a brick outside a box. \param corner  its first voxel
+void clip(const Box& box, Coord corner, BrickMask& mask) {
+  constexpr int kLast = kBrickSide - 1;
+  if (box.contains(corner) && box.contains(corner + Coord{kLast, kLast, kLast})) return;
+  const BrickMask all = std::exchange(mask, {});
+  for (int v = 0; v < kBrickVoxels; ++v)
+    if (all.test(v) && box.contains(corner + voxelLocal(v))) mask.set(v);
 }
 
 /// Makes a voxel of each face of the active box active that would lose all of its active voxels.
@@ -239,57 +287,77 @@ void keepBox(const SparseVolume& volume, const Box& box, std::vector<BrickMask>&
   }
 }
 
-/// Gives a layer these active voxels. Of the others, those that do not differ from the background
-/// become vacant.
-void activate(const SparseVolume& volume, const std::vector<BrickMask>& active,
-              const std::vector<BrickMask>& differing, VoxelLayer& layer) {
+/// Lets the values decide which voxels of the active box are active: those that differ from the background by more than a
+/// bound, and the few that keep the box. Of the others, those that do not differ from the background become vacant.
+void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
+  const Box box = activeBox(volume);
   const std::int32_t background = codec::codeOfValue(layer, volume.background);
+  std::vector<BrickMask>& differs = layer.vacant;  // until the active voxels are known
   parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    layer.active[b] = active[b];
-    layer.vacant[b] = {};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      if (active[b].test(v) || differing[b].test(v)) continue;
-      layer.vacant[b].set(v);
-      layer.codes[b * kBrickVoxels + std::size_t(v)] = background;
-    }
+    differs[b] = differing(volume.brickValues(b), volume.background, bound);
+    layer.active[b] = differs[b];
+    clip(box, volume.brickCorner(b), layer.active[b]);
+  });
+  keepBox(volume, box, layer.active);
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const std::span codes(&layer.codes[b * kBrickVoxels], std::size_t(kBrickVoxels));
+    for (std::size_t w = 0; w < layer.vacant[b].words.size(); ++w)
+      layer.vacant[b].words[w] = ~(layer.active[b].words[w] | differs[b].words[w]);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      codes[std::size_t(v)] = layer.vacant[b].test(v) ? background : codes[std::size_t(v)];
   });
   dropVacant(layer);
 }
 
-void activateByValue(const SparseVolume& volume, double bound, VoxelLayer& layer) {
-  const auto differs = differing(volume, bound);
-  auto active = differs;
-  const Box box = activeBox(volume);
-  clip(volume, box, active);
-  keepBox(volume, box, active);
-  activate(volume, active, differs, layer);
+/// The voxels of a volume on a lattice. \param bound  of the differences from the background of voxels that become inactive
+VoxelLayer onLattice(const SparseVolume& volume, double halfStep, double bound, Activity activity,
+                     RoundedSigns signs) {
+  VoxelLayer layer = quantised(volume, halfStep, signs);
+  if (activity == Activity::kByValue) activateByValue(volume, bound, layer);
+  return layer;
+}
+
+/// The share of a bound that is half a step. A negative value near 0 that keeps its sign is up to a whole step off.
+double shareOfBound(RoundedSigns signs) {
+  return (signs == RoundedSigns::kKept ? 0.5 : 1.0) * kMargin;
+}
+
+void requireUsable(double bound) {
+  if (!(std::isfinite(bound) && bound > 0.0))
+    throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
 }
 
 }  // namespace
 
 VoxelLayer boundedLayer(const SparseVolume& volume, double bound, Activity activity,
                         RoundedSigns signs, DecodedValues decoded) {
-  if (!(std::isfinite(bound) && bound > 0.0))
-    throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
+  requireUsable(bound);
   const bool halfs = decoded == DecodedValues::kHalfs;
   // Multiples of twice the bound are nearly exact on the first lattice. Its values may miss the
   // bound where they are rounded to float32; the second lattice is finer and leaves room for that.
-  // A negative value near 0 that keeps its sign is up to a whole step off. The half that is nearest
-  // to a code's value is at most twice as far from the source's half as this value, so that the last
+  // The half that is nearest to a code's value is at most twice as far from the source's half as this value, so that the last
   // lattice keeps the bound where values that lie on two sides of a power of 2 miss it.
-  const double side = (signs == RoundedSigns::kKept ? 0.5 : 1.0) * kMargin;
+  const double side = shareOfBound(signs);
   const double halfStep = side * (halfs ? boundBeforeRounding(volume, bound) : bound);
   std::vector<double> halfSteps{halfStep, halfStep - roundingError(volume, bound)};
   if (halfs) halfSteps.push_back(0.5 * side * bound);
   for (const double h : halfSteps) {
     if (!(h > 0.0)) break;
-    VoxelLayer layer = quantised(volume, h, signs);
-    if (activity == Activity::kByValue) activateByValue(volume, side * bound, layer);
+    VoxelLayer layer = onLattice(volume, h, side * bound, activity, signs);
     SparseVolume made = volumeOf(layer);
     if (halfs) roundToHalfs(made);
     if (largestDifference(volume, made) <= bound) return layer;
   }
   return exactLayer(volume);
+}
+
+VoxelLayer nearestLayer(const SparseVolume& volume, double bound, Activity activity,
+                        RoundedSigns signs) {
+  requireUsable(bound);
+  const double halfStep = shareOfBound(signs) * bound;
+  // float32 has no values between the steps of such a lattice.
+  if (halfStep <= largestMagnitude(volume) * 0x1p-24) return exactLayer(volume);
+  return onLattice(volume, halfStep, halfStep, activity, signs);
 }
 
 // ---- Layers that take fewer bits
@@ -299,12 +367,11 @@ namespace {
 /// The voxels of a volume in units of the lattice, in the order of the layer's codes.
 std::vector<double> placesOf(const SparseVolume& volume, const VoxelLayer& layer) {
   std::vector<double> places(layer.codes.size());
-  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
-    throwIfCancelled();
+  parallelFor(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
     const auto values = volume.brickValues(*findBrick(volume, layer.bricks[b]));
     double* place = &places[b * std::size_t(kBrickVoxels)];
     for (std::size_t v = 0; v < kBrickVoxels; ++v) place[v] = double(values[v]) * layer.divisor;
-  }
+  });
   return places;
 }
 

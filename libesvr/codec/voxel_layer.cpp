@@ -18,6 +18,20 @@ constexpr double kLargestCode = 0x1p30;
 constexpr int kFloatMantissa = 23, kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
 constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfBits = 0x7fff;
 
+/// The value of a code of a lattice. The code next to the largest float may stand for a larger number, which no
+/// float holds.
+float latticeValue(std::int32_t code, double divisor) {
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  return float(std::clamp(double(code) / divisor, -kLargest, kLargest));
+}
+
+/// The nearest code of a value, ties away from 0. A conversion that cuts off fractions is one instruction for
+/// several voxels, which std::lround is not.
+std::int32_t latticeCode(float value, double divisor) {
+  const double place = std::clamp(double(value) * divisor, -kLargestCode, kLargestCode);
+  return std::int32_t(place + std::copysign(0.5, place));
+}
+
 /// The number of a float in increasing order. -0 comes before 0, so every bit pattern has its own.
 std::int32_t orderOf(std::int32_t magnitude, bool negative) {
   return negative ? -1 - magnitude : magnitude;
@@ -77,11 +91,8 @@ float nearestHalf(float v) {
 
 float valueOfCode(const VoxelLayer& layer, std::int32_t n) {
   switch (layer.form) {
-    case VoxelForm::kQuantised: {
-      // The code next to the largest float may stand for a larger number, which no float holds.
-      constexpr double kLargest = std::numeric_limits<float>::max();
-      return float(std::clamp(double(n) / layer.divisor, -kLargest, kLargest));
-    }
+    case VoxelForm::kQuantised:
+      return latticeValue(n, layer.divisor);
     case VoxelForm::kHalf:
       return halfAt(n);
     case VoxelForm::kPalette:
@@ -95,8 +106,7 @@ float valueOfCode(const VoxelLayer& layer, std::int32_t n) {
 std::int32_t codeOfValue(const VoxelLayer& layer, float v) {
   switch (layer.form) {
     case VoxelForm::kQuantised:
-      return std::int32_t(
-          std::lround(std::clamp(double(v) * layer.divisor, -kLargestCode, kLargestCode)));
+      return latticeCode(v, layer.divisor);
     case VoxelForm::kHalf:
       return orderOfHalf(v);
     case VoxelForm::kPalette:
@@ -106,6 +116,28 @@ std::int32_t codeOfValue(const VoxelLayer& layer, float v) {
       break;
   }
   return orderOfFloat(v);
+}
+
+void valuesOfCodes(const VoxelLayer& layer, std::span<const std::int32_t> codes,
+                   std::span<float> values) {
+  if (layer.form == VoxelForm::kQuantised)
+    std::ranges::transform(codes, values.begin(), [divisor = layer.divisor](std::int32_t code) {
+      return latticeValue(code, divisor);
+    });
+  else
+    std::ranges::transform(codes, values.begin(),
+                           [&](std::int32_t code) { return valueOfCode(layer, code); });
+}
+
+void codesOfValues(const VoxelLayer& layer, std::span<const float> values,
+                   std::span<std::int32_t> codes) {
+  if (layer.form == VoxelForm::kQuantised)
+    std::ranges::transform(values, codes.begin(), [divisor = layer.divisor](float value) {
+      return latticeCode(value, divisor);
+    });
+  else
+    std::ranges::transform(values, codes.begin(),
+                           [&](float value) { return codeOfValue(layer, value); });
 }
 
 }  // namespace codec
@@ -118,11 +150,19 @@ SparseVolume volumeOf(const VoxelLayer& layer) {
   volume.active = layer.active;
   volume.values = VoxelArray<float>(layer.codes.size(), layer.codes.get_allocator());
   parallelFor(std::size_t{0}, layer.bricks.size(), [&](std::size_t b) {
-    for (std::size_t v = 0; v < kBrickVoxels; ++v) {
-      const std::size_t i = b * kBrickVoxels + v;
-      volume.values[i] = layer.vacant[b].test(int(v)) ? layer.background
-                                                      : codec::valueOfCode(layer, layer.codes[i]);
+    const auto values = volume.brickValues(b);
+    const std::span codes(&layer.codes[b * kBrickVoxels], std::size_t(kBrickVoxels));
+    const BrickMask& vacant = layer.vacant[b];
+    if (layer.form != VoxelForm::kPalette) {
+      codec::valuesOfCodes(layer, codes, values);
+      for (int v = 0; v < kBrickVoxels; ++v)
+        values[std::size_t(v)] = vacant.test(v) ? layer.background : values[std::size_t(v)];
+      return;
     }
+    // The code of a vacant voxel need not be in the palette.
+    for (int v = 0; v < kBrickVoxels; ++v)
+      values[std::size_t(v)] =
+          vacant.test(v) ? layer.background : codec::valueOfCode(layer, codes[std::size_t(v)]);
   });
   return volume;
 }

@@ -2,6 +2,7 @@
 /// The values that the codes of a voxel layer stand for (VoxelForm), and the codes of values.
 
 #include <cstdint>
+#include <span>
 
 #include "esvr/quantised.h"
 
@@ -26,5 +27,10 @@ namespace esvr::codec {
 /// The code of the value: the nearest one for kQuantised, and the exact one of values that the other
 /// forms have.
 [[nodiscard]] std::int32_t codeOfValue(const VoxelLayer& layer, float value);
+/// The same for all voxels of a brick.
+void valuesOfCodes(const VoxelLayer& layer, std::span<const std::int32_t> codes,
+                   std::span<float> values);
+void codesOfValues(const VoxelLayer& layer, std::span<const float> values,
+                   std::span<std::int32_t> codes);
 
 }  // namespace esvr::codec

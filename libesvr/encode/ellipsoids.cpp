@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 #include <vector>
 
 #include "core/add_seconds.h"
+#include "core/parallel.h"
+#include "encode/rate_control.h"
 #include "encode/root_search.h"
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
@@ -28,9 +31,10 @@ const SparseVolume& valuesOf(const Job& job) {
 double boxGain(const SparseVolume& volume, const std::optional<Box>& given) {
   const Box box = given.value_or(activeBox(volume));
   std::uint64_t active = 0;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+  for (std::size_t b = 0; given && b < volume.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v)
       active += volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v));
+  if (!given) active = activeVoxelCount(volume);
   const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
   return 10.0 * std::log10(std::max(share, 1.0));
 }
@@ -85,10 +89,16 @@ bool saturates(const SparseVolume& volume) {
   const auto isExtreme = [&](float v) {
     return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
   };
-  std::uint64_t extreme = 0;
-  for (std::size_t i = 0; i < volume.values.size(); ++i)
-    extreme +=
-        isExtreme(volume.values[i]) && volume.active[i / kBrickVoxels].test(int(i % kBrickVoxels));
+  using Range = tbb::blocked_range<std::size_t>;
+  const auto extreme = parallelReduce(
+      Range(0, volume.brickCount()), std::uint64_t{0},
+      [&](const Range& bricks, std::uint64_t count) {
+        for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
+          for (int v = 0; v < kBrickVoxels; ++v)
+            count += isExtreme(volume.brickValues(b)[std::size_t(v)]) && volume.active[b].test(v);
+        return count;
+      },
+      std::plus<>());
   return double(extreme) >= kTuning.saturatedShare * double(activeVoxelCount(volume));
 }
 
@@ -99,24 +109,37 @@ namespace {
 /// PSNR of the sum over the box at the end of a fit, as the device of the fit measures it.
 double lastPsnr(const FitResult& fit) { return fit.curve.empty() ? 0.0 : fit.curve.back().psnrBox; }
 
+/// Rows for the errors of the layers of a judged grid, which are measured when everything else is done
+/// (measureLayers). Their bytes count before.
+void reserveLayerErrors(const Job& job, StoredGrid& grid) {
+  if (!job.judge) return;
+  const std::size_t layers = layerCount(grid);
+  grid.layerErrors.assign(layers > 1 ? layers : 0, {});
+}
+
 /// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
 /// cancelled meanwhile. Rate control passes over the whole volume on the device of the fit, or on the
 /// CPU if the fit was divided into chunks, because the volume may not fit into the GPU's memory.
+/// \param steps  those of the result; null: they are searched for the target
 CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
-                          CompactOptions target) {
+                          CompactOptions target, const QuantiserSteps* steps = nullptr) {
   const FitOptions& wanted = job.options.fit;
-  if (job.judge) target.layerErrors = false;  // those of the values are measured at the end
+  if (job.judge) target.layerErrors = false;
   target.box = wanted.box;
   target.peak = wanted.peak;
   target.device = fit.chunks > 1 ? Device{} : wanted.device;
   auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
     if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return compactGrid(grid, job.input.source, target);
+    return steps ? compactAt(*steps, grid, job.input.source, target)
+                 : compactGrid(grid, job.input.source, target);
   });
-  if (found) return std::move(*found);
-  const BestSoFar completion;
-  target.quick = true;
-  return compactGrid(grid, job.input.source, target);
+  if (!found) {
+    const BestSoFar completion;
+    target.quick = true;
+    found = compactGrid(grid, job.input.source, target);
+  }
+  reserveLayerErrors(job, found->grid);
+  return std::move(*found);
 }
 
 Conversion conversionOf(FitResult fit, CompactResult compact) {
@@ -187,8 +210,8 @@ constexpr double kGrownFrom = 0.9;
 /// one is that near.
 constexpr double kNear = 1.3;
 constexpr int kMostDrafts = 3;
-/// Largest number of ellipsoids of the first of them, and of one that scouts before them.
-constexpr double kMostOfFirstDraft = 6000.0, kMostOfScout = 2000.0;
+/// Largest number of ellipsoids of the first of them, and the largest growth from one to the next.
+constexpr double kMostOfFirstDraft = 2000.0, kMostGrowthOfDraft = 4.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
 constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
@@ -196,11 +219,14 @@ constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
 constexpr std::uint64_t kRefillDivisor = 100;
-/// Limits of the loss by rounding for a judge, dB over the box, the difference of two that is not tried,
-/// the dB by which a rounded grid may exceed a PSNR, and the times that a fit is rounded for it.
-constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kNarrowestLoss = 0.01,
-                 kPsnrSpare = 0.12;
+/// Limits of the loss by rounding for a judge, dB over the box; the octaves by which the steps may then be scaled, and
+/// those that make no difference; the dB by which a rounded grid may exceed a PSNR, and the times that a fit is rounded
+/// for it.
+constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kMostFiner = 3.0,
+                 kNarrowestFiner = 0.02, kPsnrSpare = 0.08;
 constexpr int kMostRoundings = 4;
+/// A judge's PSNR is that of scaled sums, from which that of a reader, who decodes, differs by 1e-7 dB.
+constexpr double kJudgedMargin = 1e-5;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
 constexpr double kMostBehind = 2.5;
 /// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
@@ -221,7 +247,7 @@ double countFor(const Attempt& from, double psnr, double slope) {
 
 EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
     : options_(job.options),
-      job_{job.input, options_, job.judge},
+      job_{job.input, options_, job.judge, job.scout},
       goal_(goal),
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
@@ -276,8 +302,15 @@ double firstCount(const Job& job) {
 }  // namespace
 
 Attempt scoutingFit(const Job& job) {
-  const double count = std::min(firstCount(job), kMostOfScout);
+  const double count = std::min(firstCount(job), kMostOfFirstDraft);
   return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
+}
+
+/// The job's scout, if it has about so many ellipsoids, or a new fit.
+Attempt EllipsoidSearch::firstShortFit(double count) const {
+  const Attempt* scout = job_.scout;
+  const bool fits = scout && std::abs(std::log(countOf(*scout) / count)) <= std::log(kNear);
+  return fits ? *scout : shortFit(count);
 }
 
 Attempt EllipsoidSearch::shortFit(double count) const {
@@ -329,35 +362,38 @@ CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions 
 }
 
 /// The smallest conversion of an attempt with the PSNR of the goal. Rate control knows the error over the
-/// box alone. A judge's PSNR loses about as many dB, which is measured.
-Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) const {
-  const auto stored = [&](FitResult fit, StoredGrid grid, const CompactOptions& target) {
-    Conversion conversion = storedAs(job_, std::move(fit), std::move(grid), target);
+/// box alone, by which it finds the proportions of the steps. A judge's PSNR loses about as many dB, which is measured;
+/// where it misses the goal or exceeds it, all steps are scaled.
+Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
+  if (!job_.judge || !compact_) {
+    Conversion conversion =
+        storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
     conversion.decisions.bothSigns = bothSigns_;
     return conversion;
-  };
-  if (!job_.judge || !compact_)
-    return stored(std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
-  RootSearch search({-kMostRoundingLoss, -kLeastLoss, kNarrowestLoss},
-                    *goal_.psnr + 0.5 * kPsnrSpare, rounding_.factor,
-                    -(attempt.psnr - *goal_.psnr) / rounding_.factor);
-  std::optional<Conversion> best;
-  double bestOver = 0.0;
-  for (int trial = 0; trial < kMostRoundings && !search.ended(); ++trial) {
-    Conversion made = stored(attempt.fit, attempt.grid, {.loss = -search.next()});
-    const auto judged = unlessCancelled([&]() -> std::optional<double> {
-      if (isCancelled(job_)) return std::nullopt;
-      return keepMass(job_, made.grid);
-    });
-    const double psnr = judged ? *judged : psnrOf(job_, made), over = psnr - *goal_.psnr;
-    const bool isBetter =
-        !best || (bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver);
-    if (isBetter) best = std::move(made), bestOver = over;
-    if ((over >= 0.0 && over <= kPsnrSpare) || attempt.cancelled()) break;
-    search.learn(psnr);
   }
-  if (bestOver < 0.0 && !attempt.cancelled()) best->fit.end = FitEnd::kPsnrMissed;
-  return std::move(*best);
+  const double loss =
+      std::clamp((attempt.psnr - *goal_.psnr) / rounding_.factor, kLeastLoss, kMostRoundingLoss);
+  CompactResult made = compacted(attempt, {.loss = loss});
+  const QuantiserSteps steps = made.steps;
+  // The loss, dB, falls by a factor of 4 for an octave.
+  RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, *goal_.psnr + 0.5 * kPsnrSpare,
+                    std::log(4.0) * rounding_.factor * loss, 0.0);
+  std::optional<CompactResult> best;
+  for (int trial = 1;; ++trial) {
+    const double psnr = completed(attempt, made), over = psnr - *goal_.psnr - kJudgedMargin;
+    const double bestOver = best ? *reached_ - *goal_.psnr - kJudgedMargin : -HUGE_VAL;
+    const bool isBetter = bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver;
+    if (isBetter) best = std::move(made), reached_ = psnr;
+    if ((over >= 0.0 && over <= kPsnrSpare) || attempt.cancelled() || isCancelled(job_)) break;
+    search.learn(psnr);
+    if (trial == kMostRoundings || search.ended()) break;
+    const QuantiserSteps next = finer(steps, search.next());
+    made = compactedTo(job_, attempt.grid, attempt.fit, {}, &next);
+  }
+  if (*reached_ < *goal_.psnr && !attempt.cancelled()) attempt.fit.end = FitEnd::kPsnrMissed;
+  Conversion conversion = conversionOf(std::move(attempt.fit), std::move(*best));
+  conversion.decisions.bothSigns = bothSigns_;
+  return conversion;
 }
 
 /// The quality that an attempt has after rounding. A grid that is seen gets the mass of its source.
@@ -403,10 +439,12 @@ void EllipsoidSearch::draftNearPsnr() {
   double guess = firstCount(job_);
   // Where ellipsoids win, they usually take about half of the bytes.
   if (goal_.below) guess = std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach);
-  draft_ = shortFit(capped(guess));
+  draft_ = job_.scout ? *job_.scout : shortFit(capped(guess));
   for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
-    if (draft_->cancelled() || !mayStayBelow(goal_.below.value_or(UINT64_MAX))) return;
-    const double count = capped(kGrownFrom * forecastCount(aim()));
+    isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
+    if (draft_->cancelled() || isTooLarge_) return;
+    const double count =
+        capped(std::min(kGrownFrom * forecastCount(aim()), kMostGrowthOfDraft * countOf(*draft_)));
     const double ratio = count / countOf(*draft_);
     if (std::max(ratio, 1.0 / ratio) <= kNear) return;
     auto nearer = unlessCancelled([&]() -> std::optional<Attempt> { return shortFit(count); });
@@ -415,9 +453,11 @@ void EllipsoidSearch::draftNearPsnr() {
       return;
     }
     const double doublings = std::log2(countOf(*nearer) / countOf(*draft_));
-    if (std::abs(doublings) >= std::log2(kMinSlopeRatio))
+    if (std::abs(doublings) >= std::log2(kMinSlopeRatio)) {
+      slopeIsKnown_ = true;
       slope_ = std::clamp((nearer->psnr - draft_->psnr) / doublings, kMinSlope,
                           2.0 * kTuning.steepestDbPerDoubling);
+    }
     draft_ = std::move(nearer);
   }
 }
@@ -477,7 +517,7 @@ void EllipsoidSearch::draft(const CancelToken* cancel) {
   if (goal_.psnr)
     draftNearPsnr();
   else
-    draft_ = shortFit(firstCount(job_));
+    draft_ = firstShortFit(firstCount(job_));
   if (!goal_.below || mayStayBelow(*goal_.below)) decideSigns();
   forecast();
   options_.fit.cancel = own;
@@ -494,14 +534,19 @@ bool EllipsoidSearch::mayReach(double psnr) const {
 
 bool EllipsoidSearch::mayStayBelow(std::uint64_t bytes) const {
   if (draft_->cancelled()) return true;
-  const double slope = expectedBytes_ > 0 ? slope_ : kTuning.steepestDbPerDoubling;
+  if (isTooLarge_) return false;
+  const bool isKnown = slopeIsKnown_ || expectedBytes_ > 0;
+  const double slope = isKnown ? slope_ : kTuning.steepestDbPerDoubling;
   const double count = countFor(*draft_, aim() - behind() - kTuning.uncertainty, slope);
   return count <= double(maxCount_) && double(besides_) + price_ * count <= double(bytes);
 }
 
 // ---- Whole fits
 
-std::optional<Conversion> EllipsoidSearch::run() { return goal_.psnr ? runToPsnr() : runToSize(); }
+std::optional<Conversion> EllipsoidSearch::run() {
+  reached_.reset();
+  return goal_.psnr ? runToPsnr() : runToSize();
+}
 
 /// The number of ellipsoids grows with their PSNR: a root search over its logarithm.
 std::optional<Conversion> EllipsoidSearch::runToPsnr() {
@@ -550,9 +595,13 @@ Conversion EllipsoidSearch::smallestOrBest() {
         a->psnr - *goal_.psnr >= margin_.min && a->psnr - *goal_.psnr <= margin_.max;
     if (smallest && !isNear) break;
     if (!a->cancelled()) a->fit.end = FitEnd::kPsnrReached;
+    const auto before = std::exchange(reached_, std::nullopt);
     Conversion now = storedForPsnr(std::move(*a));
     const std::uint64_t bytes = bytesOfEllipsoids(now.grid);
-    if (!smallest || bytes < fewest) smallest = std::move(now), fewest = bytes;
+    if (!smallest || bytes < fewest)
+      smallest = std::move(now), fewest = bytes;
+    else
+      reached_ = before;
   }
   return std::move(*smallest);
 }
@@ -607,6 +656,7 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
       const double reached = completed(*attempt, *now);
       if (!best || reached > quality) {
         quality = reached;
+        if (job_.judge) reached_ = reached;
         take(std::move(*attempt), std::move(*now));
       }
     }

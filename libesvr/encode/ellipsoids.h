@@ -86,6 +86,8 @@ class EllipsoidSearch {
   /// Makes the whole fits. For a PSNR that is missed, the best of them is marked kPsnrMissed.
   /// \return nothing if the grid does not fit into the size; needed() says what it takes then
   [[nodiscard]] std::optional<Conversion> run();
+  /// The judged quality of the result, dB, if it was measured.
+  [[nodiscard]] const std::optional<double>& reached() const { return reached_; }
 
   [[nodiscard]] std::uint64_t needed() const { return needed_; }
   /// True if there is a short fit, and if it was not cancelled.
@@ -94,10 +96,11 @@ class EllipsoidSearch {
 
  private:
   [[nodiscard]] Attempt shortFit(double count) const;
+  [[nodiscard]] Attempt firstShortFit(double count) const;
   [[nodiscard]] Attempt wholeFit(double count) const;
   [[nodiscard]] const Attempt* startFor(double count) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
-  [[nodiscard]] Conversion storedForPsnr(Attempt attempt) const;
+  [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
   [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void draftNearPsnr();
@@ -121,6 +124,8 @@ class EllipsoidSearch {
   Rounding rounding_;
   Margin margin_;
   double slope_ = kDbPerDoubling;
+  bool slopeIsKnown_ = false;  ///< from two short fits
+  bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below Goal::below
   std::uint64_t maxCount_;
   Decision bothSigns_;
   std::optional<Attempt> draft_;
@@ -128,6 +133,7 @@ class EllipsoidSearch {
   std::uint64_t besides_ = 0;              ///< bytes of the grid's other sections
   std::uint64_t expectedBytes_ = 0, needed_ = 0;
   std::vector<Attempt> attempts_;
+  std::optional<double> reached_;  ///< as reached(), of the conversion that was made last or kept
 };
 
 /// True if many active voxels have an extreme value of the volume, so that both signs of intensities

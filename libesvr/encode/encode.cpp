@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "core/add_seconds.h"
+#include "core/parallel.h"
 #include "encode/ellipsoids.h"
 #include "encode/signs.h"
 #include "encode/tone.h"
@@ -186,9 +187,10 @@ class Choice {
   void completeEllipsoids() {
     seconds_ +=
         secondsOf([&] { conversion_ = unlessCancelled([&] { return ellipsoids_->run(); }); });
-    if (conversion_)
-      figures_ = Candidate{bytesOfEllipsoids(conversion_->grid), psnrOf(job_, *conversion_), false,
-                           seconds_};
+    if (!conversion_) return;
+    const auto& reached = ellipsoids_->reached();
+    figures_ = Candidate{bytesOfEllipsoids(conversion_->grid),
+                         reached ? *reached : psnrOf(job_, *conversion_), false, seconds_};
   }
 
   std::optional<VoxelCandidate> finishedVoxels() {
@@ -295,7 +297,7 @@ class Converter {
     ConvertOptions options = job_.options;
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
-    const Job job{job_.input, options, job_.judge};
+    const Job job{job_.input, options, job_.judge, job_.scout};
     const double psnr = seesPictures(job) ? presetPicturePsnr(options.fit.preset)
                                           : presetPsnr(options.fit.preset) +
                                                 boxGain(job.input.source, options.fit.box);
@@ -422,15 +424,34 @@ void requirePossible(const ConvertOptions& options) {
 /// of float32.
 constexpr float kLargestSummable = 0x1p120f;
 
+/// The first brick of a volume for which `is` holds, or nothing.
+template <class Is>
+std::optional<std::size_t> firstBrick(const SparseVolume& volume, const Is& is) {
+  using Range = tbb::blocked_range<std::size_t>;
+  const std::size_t none = volume.brickCount();
+  const std::size_t first = parallelReduce(
+      Range(0, none), none,
+      [&](const Range& bricks, std::size_t found) {
+        for (std::size_t b = bricks.begin(); b < std::min(bricks.end(), found); ++b)
+          if (is(b)) return b;
+        return found;
+      },
+      [](std::size_t a, std::size_t b) { return std::min(a, b); });
+  return first < none ? std::optional(first) : std::nullopt;
+}
+
 /// A voxel whose value differs too much from the background for sums in float32, or nothing.
 std::optional<Coord> tooLargeForSums(const SparseVolume& volume) {
   const auto isTooLarge = [background = volume.background](float value) {
     return std::abs(double(value) - background) > kLargestSummable;
   };
-  const auto found = std::find_if(volume.values.begin(), volume.values.end(), isTooLarge);
-  if (found == volume.values.end()) return std::nullopt;
-  const auto place = std::size_t(found - volume.values.begin());
-  return volume.brickCorner(place / kBrickVoxels) + voxelLocal(int(place % kBrickVoxels));
+  const auto brick = firstBrick(volume, [&](std::size_t b) {
+    return std::ranges::any_of(volume.brickValues(b), isTooLarge);
+  });
+  if (!brick) return std::nullopt;
+  const auto values = volume.brickValues(*brick);
+  const auto place = std::ranges::find_if(values, isTooLarge) - values.begin();
+  return volume.brickCorner(*brick) + voxelLocal(int(place));
 }
 
 [[noreturn]] void refuseSums(const ConvertInput& input, Coord tooLarge) {
@@ -485,11 +506,12 @@ float meanOf(const SparseVolume& volume, const ValueRange& range) {
 
 /// True if all inactive voxels have the background.
 bool isUniformOutside(const SparseVolume& volume) {
-  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+  return !firstBrick(volume, [&](std::size_t b) {
     for (int v = 0; v < kBrickVoxels; ++v)
       if (!volume.active[b].test(v) && volume.brickValues(b)[std::size_t(v)] != volume.background)
-        return false;
-  return true;
+        return true;
+    return false;
+  });
 }
 
 /// The background to which the values of a volume are stored if its own is far from them: that of
@@ -565,7 +587,9 @@ std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptio
 }
 
 /// Converts a volume that is judged by pictures, or by the values of its tones.
-Conversion convertJudged(const ConvertInput& given, ConvertOptions options, ToneCurve tone) {
+Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
+                         const ToneChoice& choice) {
+  const ToneCurve tone = choice.tone;
   const Judge judge(given, options, tone);
   GridDescriptor descriptor = given.descriptor;
   SparseVolume tones;
@@ -585,12 +609,15 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options, Tone
       size->bytes -= std::min<std::uint64_t>(size->bytes, sizeof tone.scale);
   }
   const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
-  const Job job{input, options, &judge};
+  const Job job{input, options, &judge, choice.scout ? &*choice.scout : nullptr};
   Conversion conversion = std::visit(Converter(job), options.goal);
   conversion.smallerExactBytes =
       unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
   if (tone.isOn()) setTone(given, tone, conversion.grid);
-  if (conversion.fit.end != FitEnd::kCancelled) measureLayers(given, conversion.grid);
+  if (conversion.fit.end != FitEnd::kCancelled)
+    measureLayers(given, conversion.grid);
+  else
+    conversion.grid.layerErrors.clear();
   conversion.byPictures = judge.seesPictures();
   conversion.grid = throughTheFormat(std::move(conversion.grid), previous, memoryOf(given.source));
   return conversion;
@@ -617,8 +644,9 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
   };
   if (std::holds_alternative<PictureGoal>(own.goal) && !Judge::seesPictures(input, own))
     own.goal = PresetGoal{};
-  const ToneCurve tone = chooseTone(input, own);
-  if (tone.isOn() || Judge::seesPictures(input, own)) return convertJudged(input, own, tone);
+  const ToneChoice choice = chooseTone(input, own);
+  if (choice.tone.isOn() || Judge::seesPictures(input, own))
+    return convertJudged(input, own, choice);
   const Job job{input, own};
   Conversion conversion = own.fit.narrowBand ? convertNarrowBand(job, convertTo) : convertTo(job);
   conversion.smallerExactBytes =

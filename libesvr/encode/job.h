@@ -10,6 +10,7 @@
 
 namespace esvr::encode {
 
+struct Attempt;
 class Judge;
 
 /// The input and the options of a conversion, which a job does not own.
@@ -17,6 +18,8 @@ struct Job {
   const ConvertInput& input;  ///< has the tones of the values if there is a tone curve
   const ConvertOptions& options;
   const Judge* judge = nullptr;  ///< null: quality is the PSNR over the box
+  /// A short fit that was made with this input and judge, null if none was
+  const Attempt* scout = nullptr;
 };
 
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.

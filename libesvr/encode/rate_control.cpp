@@ -302,7 +302,7 @@ RateTrial approach(RateTrials& trials, const StepGoal& goal, const QuantiserStep
   RootSearch search = goal.search(0.0);
   for (int n = 1;; ++n) {
     const double fineness = search.next();
-    RateTrial trial = trials.make(scaled(steps, std::exp2(-fineness)));
+    RateTrial trial = trials.make(finer(steps, fineness));
     search.learn(goal.figure(trial));
     if (n >= kFirstTrials || std::abs(search.next() - fineness) < kBalanceRange) return trial;
   }
@@ -315,7 +315,7 @@ RateTrial scaleTo(RateTrials& trials, const StepGoal& goal, const QuantiserSteps
   RootSearch search = goal.search(fineness);
   std::optional<RateTrial> best;
   for (int n = 0; n < kMaxTrials && !(search.ended() && best && goal.met(*best)); ++n) {
-    RateTrial trial = trials.make(scaled(steps, std::exp2(-search.next())));
+    RateTrial trial = trials.make(finer(steps, search.next()));
     search.learn(goal.figure(trial));
     const bool replaces =
         !best || (goal.met(trial) != goal.met(*best) ? goal.met(trial) : goal.better(trial, *best));
@@ -454,8 +454,9 @@ std::vector<LayerError> decodedLayerErrors(const StoredGrid& grid, const SparseV
   return errors;
 }
 
+/// \param steps  those of the result; null: they are searched
 CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
-                          const CompactOptions& options) {
+                          const CompactOptions& options, const QuantiserSteps* steps = nullptr) {
   CompactResult result{grid, {}, 0.0, 0};
   if (grid.field.ellipsoidCount() == 0) return result;
   const Box box = options.box.value_or(activeBox(source));
@@ -464,7 +465,7 @@ CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
                            .device = options.device,
                            .peak = options.peak,
                            .quick = options.quick});
-  RateTrial best = chosen(trials, options);
+  RateTrial best = steps ? trials.make(*steps) : chosen(trials, options);
   if (options.quick) best.error = trials.measure(best);
   // The trials know no mask, and no voxels outside the active box that become the background.
   const bool sameRule = grid.topology != TopologyKind::kMask && common(box, grid.activeBox) == box;
@@ -505,6 +506,16 @@ CompactResult corrected(CompactResult best, const StoredGrid& grid, const Sparse
 }
 
 }  // namespace
+
+QuantiserSteps finer(QuantiserSteps steps, double octaves) {
+  return scaled(steps, std::exp2(-octaves));
+}
+
+CompactResult compactAt(const QuantiserSteps& steps, const StoredGrid& grid,
+                        const SparseVolume& source, const CompactOptions& options) {
+  return compactOnce(grid, source, options, &steps);
+}
+
 }  // namespace esvr::encode
 
 namespace esvr {

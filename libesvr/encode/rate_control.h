@@ -10,6 +10,7 @@
 
 #include "esvr/container.h"
 #include "esvr/device.h"
+#include "esvr/encode.h"
 #include "esvr/quantised.h"
 #include "esvr/volume.h"
 #include "fit/intensity_problem.h"
@@ -90,5 +91,12 @@ class RateTrials {
   bool quick_;
   double peak_, error_ = 0.0, leastError_ = 0.0;
 };
+
+/// Steps that are finer by a number of octaves.
+[[nodiscard]] QuantiserSteps finer(QuantiserSteps steps, double octaves);
+
+/// Compacts a grid like compactGrid(), with given steps in place of a search for them.
+[[nodiscard]] CompactResult compactAt(const QuantiserSteps& steps, const StoredGrid& grid,
+                                      const SparseVolume& source, const CompactOptions& options);
 
 }  // namespace esvr::encode

@@ -15,6 +15,8 @@
 #include "esvr/encode.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "field/voxel_rule.h"
+#include "format/grid_rule.h"
 
 namespace esvr::encode {
 
@@ -29,6 +31,16 @@ bool leavesTheMeasure(const Goal& goal) {
 
 /// dB by which the PSNR of a preset's pictures is lower than that of its values.
 constexpr double kPicturesBelowValues = 2.0;
+
+/// The sum of of(value) over the voxels of all bricks, in an order that does not depend on the number of threads.
+template <class Of>
+double sumOfBricks(const SparseVolume& volume, const Of& of) {
+  std::vector<double> parts(volume.brickCount());
+  parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
+    for (const float value : volume.brickValues(b)) parts[b] += double(of(value));
+  });
+  return std::accumulate(parts.begin(), parts.end(), 0.0);
+}
 
 }  // namespace
 
@@ -49,6 +61,7 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
   range_.expand(input.source.background);
   if (!seesPictures(input, options)) return;
   pictures_.emplace(input.source, options.fit.box);
+  mass_ = sumOfBricks(input.source, [](float value) { return value; });
   if (leavesTheMeasure(options.goal))
     valueGain_ = (tone.isOn() ? kTuning.picturesAboveValues : -kPicturesBelowValues) -
                  boxGain(input.source, options.fit.box);
@@ -82,33 +95,28 @@ double Judge::forTones(SparseVolume volume) const {
 
 // A reader may round the values to halfs, which changes sums of many of them by much less than what is kept here.
 double Judge::massOf(const SparseVolume& tones, double factor) const {
-  std::vector<double> parts(tones.brickCount());
-  parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
-    for (const float u : tones.brickValues(b))
-      parts[b] += std::clamp(tone_.value(float(u * factor)), range_.min, range_.max);
+  return sumOfBricks(tones, [&](float u) {
+    return std::clamp(tone_.value(float(u * factor)), range_.min, range_.max);
   });
-  return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
 
 double Judge::massFactor(double wanted, const SparseVolume& decoded) const {
   // The derivative of the mass by the factor: that of a value is u dv/du = u cosh(u / s).
-  std::vector<double> parts(decoded.brickCount());
   const double s = tone_.scale;
-  parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
-    for (const float u : decoded.brickValues(b))
-      parts[b] += tone_.isOn() ? u * std::cosh(u / s) : u;
-  });
-  const double growth = std::accumulate(parts.begin(), parts.end(), 0.0);
-  // Values that are clamped are not in the derivative, so that one step does not suffice where many are. A
+  double growth =
+      sumOfBricks(decoded, [&](float u) { return tone_.isOn() ? u * std::cosh(u / s) : u; });
+  // Values that are clamped do not grow, so that after the first step the slope is that of the last two masses. A
   // factor farther from 1 would change what is seen more than the missing mass does.
-  constexpr int kSteps = 3;
+  constexpr int kSteps = 5;
   constexpr double kMostChange = 0.05, kEnough = 1e-5;
-  double factor = 1.0;
+  double factor = 1.0, mass = massOf(decoded);
   for (int n = 0; n < kSteps; ++n) {
-    const double change = (wanted - massOf(decoded, factor)) / growth;
+    const double change = (wanted - mass) / growth;
     if (!(std::abs(factor + change - 1.0) <= kMostChange)) return factor;
     factor += change;
     if (std::abs(change) < kEnough) break;
+    const double before = std::exchange(mass, massOf(decoded, factor));
+    growth = (mass - before) / change;
   }
   return factor;
 }
@@ -116,27 +124,22 @@ double Judge::massFactor(double wanted, const SparseVolume& decoded) const {
 double keepMass(const Job& job, StoredGrid& grid) {
   const auto decoded = [&] { return decodeGrid(grid, {.memory = memoryOf(job.input.source)}); };
   if (!seesPictures(job) || grid.quantised.empty()) return psnrOf(job, decoded());
-  // Decoded sums are clamped to the range of the source, so that a step may miss a third of what it corrects. A factor that
-  // is nearer to 1 than kFar leaves an error of less than a thousandth.
-  constexpr int kMostSteps = 4;
-  constexpr double kFar = 0.002;
-  const double wanted = job.judge->massOf(job.input.source);
-  for (int step = 1;; ++step) {
-    SparseVolume tones = decoded();
-    const double factor = job.judge->massFactor(wanted, tones);
-    for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
-      grid.quantised[c].lattice.intensityStep *= factor;
-      grid.field.chunks[c].ellipsoids = dequantise(grid.quantised[c]);
-    }
-    if (grid.activeThreshold >
-        0.0f)  // a negative one, by which all voxels are active, may be the lowest float
-      grid.activeThreshold = float(grid.activeThreshold * factor);
-    if (std::abs(factor - 1.0) > kFar && step < kMostSteps) continue;
-    parallelFor(std::size_t{0}, tones.brickCount(), [&](std::size_t b) {
-      for (float& tone : tones.brickValues(b)) tone = float(tone * factor);
-    });
-    return psnrOf(job, std::move(tones));
+  // Sums that are not clamped yet grow with the factor.
+  const bool isClamped = std::exchange(grid.withinRange, false);
+  SparseVolume sums = decoded();
+  grid.withinRange = isClamped;
+  const double factor = job.judge->massFactor(job.judge->mass(), sums);
+  for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
+    grid.quantised[c].lattice.intensityStep *= factor;
+    grid.field.chunks[c].ellipsoids = dequantise(grid.quantised[c]);
   }
+  // A negative threshold, by which all voxels are active, may be the lowest float.
+  if (grid.activeThreshold > 0.0f) grid.activeThreshold = float(grid.activeThreshold * factor);
+  const VoxelRule rule = format::ruleOf(grid);
+  parallelFor(std::size_t{0}, sums.brickCount(), [&](std::size_t b) {
+    for (float& sum : sums.brickValues(b)) sum = rule.settled(float(sum * factor));
+  });
+  return psnrOf(job, std::move(sums));
 }
 
 // ---- The tone curve
@@ -173,32 +176,41 @@ ToneCurve likelyTone(const SparseVolume& volume) {
   return {float(std::cbrt(median * quartile * quartile))};
 }
 
-/// The quality of a short fit with a curve, for the comparison of curves.
-double qualityWith(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options) {
+/// A short fit with a curve, and its quality for the comparison of curves.
+struct ToneTrial {
+  Attempt made;
+  double quality = 0.0;
+};
+
+ToneTrial tried(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options) {
   const Judge judge(input, options, tone);
   const SparseVolume tones = tone.isOn() ? tonesOf(input.source, tone) : SparseVolume{};
   const ConvertInput toned{input.descriptor, tone.isOn() ? tones : input.source};
-  const Attempt made = scoutingFit({toned, options, &judge});
-  return judge.forTones(decodeGrid(made.grid, {.memory = memoryOf(input.source)}));
+  ToneTrial trial{scoutingFit({toned, options, &judge})};
+  trial.quality = judge.forTones(decodeGrid(trial.made.grid, {.memory = memoryOf(input.source)}));
+  return trial;
 }
 
 }  // namespace
 
-ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options) {
+ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options) {
   const bool isBounded = std::holds_alternative<BoundGoal>(options.goal) ||
                          std::holds_alternative<RelativeBoundGoal>(options.goal) ||
                          std::holds_alternative<LosslessGoal>(options.goal);
   if (isBounded || input.source.background != 0.0f) return {};
-  if (options.tone) return *options.tone;
+  if (options.tone) return {*options.tone};
   if (const StoredGrid* previous = options.previous; previous && previous->voxels)
-    return previous->tone;
+    return {previous->tone};
   if (!Judge::seesPictures(input, options)) return {};
   const ToneCurve likely = likelyTone(input.source);
-  if (!likely.isOn() || options.effort == kLeastEffort) return likely;
-  const auto gain = unlessCancelled([&] {
-    return std::optional(qualityWith(likely, input, options) - qualityWith({}, input, options));
+  if (!likely.isOn() || options.effort == kLeastEffort) return {likely};
+  auto choice = unlessCancelled([&] {
+    ToneTrial with = tried(likely, input, options), without = tried({}, input, options);
+    return std::optional(with.quality - without.quality > kTuning.toneGain
+                             ? ToneChoice{likely, std::move(with.made)}
+                             : ToneChoice{{}, std::move(without.made)});
   });
-  return gain && *gain > kTuning.toneGain ? likely : ToneCurve{};
+  return choice ? std::move(*choice) : ToneChoice{};
 }
 
 void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {

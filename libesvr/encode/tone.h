@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "encode/job.h"
+#include "encode/ellipsoids.h"
 #include "esvr/tone.h"
 #include "metrics/transmittance.h"
 
@@ -29,6 +29,8 @@ class Judge {
   /// better for thin and for dense smoke.
   [[nodiscard]] double forTones(SparseVolume volume) const;
 
+  /// The total mass of the source; 0 unless pictures are seen.
+  [[nodiscard]] double mass() const { return mass_; }
   /// The total mass of the values of tones that are multiplied by a factor.
   [[nodiscard]] double massOf(const SparseVolume& tones, double factor = 1.0) const;
 
@@ -46,15 +48,22 @@ class Judge {
   ValueRange range_;
   bool halfs_;
   CompareOptions box_;
+  double mass_ = 0.0;
   /// dB that are added to the PSNR over the box, which then is a second limit of the quality; nothing: it is
   /// none.
   std::optional<double> valueGain_;
   std::optional<metrics::TransmittanceReference> pictures_;
 };
 
+/// A tone curve, and the short fit with which it was found to be better than another one, if there was one.
+struct ToneChoice {
+  ToneCurve tone;
+  std::optional<Attempt> scout{};
+};
+
 /// The tone curve of a conversion: that of the options, that of the previous frame, or the one with which
 /// a short fit is better than without, where the values call for one.
-[[nodiscard]] ToneCurve chooseTone(const ConvertInput& input, const ConvertOptions& options);
+[[nodiscard]] ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options);
 
 /// Voxels within a bound relative to each value, and the curve whose tones they hold.
 struct RelativeLayer {

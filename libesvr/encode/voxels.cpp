@@ -155,13 +155,16 @@ constexpr int kNearestTrials = 14, kThriftyTrials = 6, kFrameTrials = 8, kSizeTr
               kPlateauTrials = 4;
 /// dB above a PSNR that end a search on the sample, and on the whole volume.
 constexpr double kPsnrTolerance = 0.05, kFinalTolerance = 0.08;
+/// Levels of a plateau from which on a lattice that contains it is fine enough for any PSNR, so that no other one is
+/// tried. Without it, the PSNR jumps with the bound.
+constexpr double kFineLevels = 4.0;
 /// Share of a size that may stay unused.
 constexpr double kSizeTolerance = 0.01;
 /// Factor by which codes may exceed a size before a trial ends. While codes are chosen, the coder's
 /// parameters are those of the nearest codes, which can take a few more bytes.
 constexpr double kCodesBeyondSize = 1.1;
 /// Where the bound cannot be chosen freely, higher prices use up the PSNR that is left.
-constexpr std::array kPlateauPrices{0.0, 0.08, 0.12, 0.2, 0.3};
+constexpr std::array kPlateauPrices{0.08, 0.12, 0.2, 0.3};
 
 RootRange octaves() { return {kCoarsest, kFinest, kNarrowest}; }
 
@@ -231,7 +234,7 @@ VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
   decision_.seconds = secondsOf([&] { plateau_ = plateauOf(tryOn_); });
   seconds_ += *decision_.seconds;
   if (!seesPictures(job)) return;
-  mass_ = job.judge->massOf(job.input.source);
+  mass_ = job.judge->mass();
   sampleMass_ = job.judge->massOf(sample_);
 }
 
@@ -249,7 +252,7 @@ double VoxelSearch::boundOf(const Setting& setting) const {
 ///                 the work stopped and the layer is of no use; null: the work never stops
 VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setting,
                                 std::uint64_t* tooMany) const {
-  VoxelLayer layer = boundedLayer(volume, boundOf(setting), voxelActivity(job_), voxelSigns(job_));
+  VoxelLayer layer = nearestLayer(volume, boundOf(setting), voxelActivity(job_), voxelSigns(job_));
   if (setting.price == 0.0) return layer;
   const StoredGrid* previous = job_.options.previous;
   ThriftOptions thrift{setting.price, previous && previous->voxels ? &*previous->voxels : nullptr,
@@ -323,21 +326,25 @@ std::optional<VoxelSearch::Tried> VoxelSearch::coarsest(const SparseVolume& volu
 
 // ---- A PSNR
 
-/// The smallest voxels found whose lattice has the value of the plateau. The number of its levels is
-/// found by bisection, although the PSNR need not be monotone in it where there are other plateaus.
-std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr, const Tried& plain) const {
-  const auto reaches = [&](double levels) {
-    return tried(tryOn_, {.levels = levels}).psnr >= psnr;
-  };
-  double enough = std::max(std::round(0.5 * plateau_.value / boundOf(plain.setting)), 1.0) + 1.0;
-  if (!reaches(enough)) return std::nullopt;
-  double tooFew = std::max(std::floor(0.5 * enough) - 1.0, 0.0);
-  while (enough - tooFew > 1.0) {
-    const double middle = std::floor(0.5 * (tooFew + enough));
-    (reaches(middle) ? enough : tooFew) = middle;
+/// The smallest voxels found whose lattice has the value of the plateau. The PSNR grows with the logarithm of the number
+/// of its levels, though it need not be monotone where there are other plateaus.
+std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr,
+                                                            const Setting& first) const {
+  std::optional<Tried> best;
+  double tooFew = 0.0, enough = HUGE_VAL;
+  double levels = std::max(std::round(0.5 * plateau_.value / boundOf(first)), 1.0);
+  for (int n = 0; n < kNearestTrials && enough - tooFew > 1.0; ++n) {
+    Tried now = tried(tryOn_, {.levels = levels});
+    const double wanted = levels * std::exp2((psnr - now.psnr) / kDbPerOctave);
+    (now.psnr >= psnr ? enough : tooFew) = levels;
+    if (now.psnr >= psnr) best = std::move(now);
+    levels = std::clamp(std::isfinite(wanted) ? std::ceil(wanted) : tooFew + 1.0, tooFew + 1.0,
+                        std::max(enough - 1.0, tooFew + 1.0));
   }
-  std::optional<Tried> best;  // a higher price takes fewer bytes
+  // A higher price takes fewer bytes. Where one level less would lose many dB, another lattice is better.
+  const bool isNear = best && best->psnr < psnr + kDbPerOctave;
   for (const double price : kPlateauPrices) {
+    if (!isNear) break;
     Tried trial = tried(tryOn_, {.price = price, .levels = enough});
     if (trial.psnr < psnr) break;
     best = std::move(trial);
@@ -346,36 +353,50 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr, const T
   return best;
 }
 
+/// The coarsest thrifty voxels that reach a PSNR.
+std::optional<VoxelSearch::Tried> VoxelSearch::thriftyForPsnr(const Tried& plain) const {
+  const bool isFrame = job_.options.previous;
+  const Setting first{plain.setting.octave + (isFrame ? price() : kThriftOctaves), price()};
+  return coarsest(tryOn_, *goal_.psnr, first, isFrame ? kFrameTrials : kThriftyTrials,
+                  kPsnrTolerance);
+}
+
 void VoxelSearch::tryForPsnr() {
   const double psnr = *goal_.psnr;
+  if (exactIsBest()) return;
   const Setting first{psnr / kDbPerOctave - 1.0};
-  auto plain =
-      range_ > 0.0 ? coarsest(tryOn_, psnr, first, kNearestTrials, kPsnrTolerance) : std::nullopt;
-  if (plain) {
-    best_ = std::move(plain);
-    const Setting thrifty{
-        best_->setting.octave + (job_.options.previous ? price() : kThriftOctaves), price()};
-    const int trials = job_.options.previous ? kFrameTrials : kThriftyTrials;
-    std::optional<Tried> cheaper, with;
-    parallelInvoke(
-        [&] {
-          cheaper = coarsest(tryOn_, psnr, thrifty, trials, kPsnrTolerance);
-          Tried& smaller = cheaper ? *cheaper : *best_;
-          smaller.bytes = bytesOf(tryOn_, smaller.layer, boundOf(smaller.setting));
-        },
-        [&] {
-          if (!hasPlateau() || job_.options.previous) return;
-          const double seconds = secondsOf([&] { with = fewestLevels(psnr, *best_); });
-          *decision_.seconds += seconds;
-          decision_.tried = true;
-        });
-    if (cheaper) best_ = std::move(cheaper);
-    decidePlateau(std::move(with));
+  std::optional<Tried> with;
+  if (hasPlateau() && !job_.options.previous && range_ > 0.0) {
+    *decision_.seconds += secondsOf([&] { with = fewestLevels(psnr, first); });
+    decision_.tried = true;
   }
+  const bool isFine = with && with->setting.levels >= kFineLevels;
+  if (!isFine && range_ > 0.0)
+    best_ = coarsest(tryOn_, psnr, first, kNearestTrials, kPsnrTolerance);
+  if (best_) {
+    if (auto cheaper = thriftyForPsnr(*best_)) best_ = std::move(cheaper);
+    best_->bytes = bytesOf(tryOn_, best_->layer, boundOf(best_->setting));
+  }
+  decidePlateau(std::move(with));
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
-  if (bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
+  if (!exact_ && bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
     exact_ = job_.options.previous ? exactVoxels(job_).bytes : exactBytes();
+}
+
+/// True if exact voxels take hardly more bytes than their active mask, which all voxels of the grid need.
+bool VoxelSearch::exactIsBest() {
+  if (voxelActivity(job_) != Activity::kExact || job_.options.previous || isToned(job_))
+    return false;
+  const VoxelLayer exact = smallestExactLayer(tryOn_);
+  if (exact.form != VoxelForm::kPalette) return false;
+  exact_ = exactBytes();
+  VoxelLayer bare = exact;
+  std::fill(bare.codes.begin(), bare.codes.end(), 0);
+  const double least =
+      bytesOfCodes(bare) / (bytesOfCodes(exact) / double(*exact_ - besides_)) + double(besides_);
+  return double(*exact_) <=
+         std::max(kTuning.exactFactor * least, least + double(kTuning.exactBytes));
 }
 
 /// Takes the lattice with the plateau where it is better, and records the decision.

@@ -90,7 +90,8 @@ class VoxelSearch {
   [[nodiscard]] std::optional<Tried> coarsest(const SparseVolume& volume, double psnr,
                                               const Setting& first, int mostTrials,
                                               double tolerance) const;
-  [[nodiscard]] std::optional<Tried> fewestLevels(double psnr, const Tried& plain) const;
+  [[nodiscard]] std::optional<Tried> fewestLevels(double psnr, const Setting& first) const;
+  [[nodiscard]] std::optional<Tried> thriftyForPsnr(const Tried& plain) const;
   [[nodiscard]] std::optional<Tried> sized(const SparseVolume& volume,
                                            const Setting& setting) const;
   [[nodiscard]] std::optional<Tried> fullest(const SparseVolume& volume,
@@ -102,6 +103,7 @@ class VoxelSearch {
   [[nodiscard]] std::uint64_t exactBytes() const;
   void matchJudge();
   void trySettings();
+  [[nodiscard]] bool exactIsBest();
   void tryForPsnr();
   void tryForSize();
   void decidePlateau(std::optional<Tried> with);

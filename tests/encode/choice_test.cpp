@@ -99,7 +99,8 @@ TEST(ChoiceForASize, SlowTakesEllipsoidsOfBlobs) {
       10.0 * std::log10(activeBox(volume).volume() / double(activeVoxelCount(volume)));
   const double limit =
       psnrOver(volume, conversion) - gain + (conversion.grid.tone.isOn() ? 4.0 : -2.0);
-  EXPECT_NEAR(*conversion.choice->ellipsoids->psnr, std::min(seen->psnr50, limit), 1e-9);
+  // The search scales sums of float32, where a reader decodes scaled steps.
+  EXPECT_NEAR(*conversion.choice->ellipsoids->psnr, std::min(seen->psnr50, limit), 1e-6);
 }
 
 TEST(ChoiceForASize, TakesExactVoxelsWhereTheyFit) {

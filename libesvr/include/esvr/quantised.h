@@ -184,6 +184,12 @@ void roundToHalfs(SparseVolume& volume);
                                       RoundedSigns signs = RoundedSigns::kMayChange,
                                       DecodedValues decoded = DecodedValues::kFloats);
 
+/// The nearest codes on the lattice of a bound, as boundedLayer() makes them first. Nothing is decoded, so that an error
+/// may exceed the bound by what values lose in float32.
+/// \throws UsageError  as boundedLayer()
+[[nodiscard]] VoxelLayer nearestLayer(const SparseVolume& volume, double bound, Activity activity,
+                                      RoundedSigns signs = RoundedSigns::kMayChange);
+
 /// What thriftyLayer() weighs. All errors are in squared steps of the quantisation lattice.
 struct ThriftOptions {
   /// Squared error that may be added to save a bit. By the theory of fine quantisation it is
@@ -217,7 +223,7 @@ struct ThriftyLayer {
 /// two steps away that takes fewer bits, if its squared error grows by less than the saved bits
 /// times the price of a bit. The error of a voxel is then at most 2.5 steps of the quantisation
 /// lattice, and errors are correlated with the coder's predictions. Vacant voxels remain vacant.
-/// \param layer  a layer that boundedLayer made from `volume`; other forms than kQuantised are
+/// \param layer  a layer that nearestLayer() or boundedLayer() made from `volume`; other forms than kQuantised are
 ///               returned unchanged
 [[nodiscard]] ThriftyLayer thriftyLayer(const SparseVolume& volume, VoxelLayer layer,
                                         const ThriftOptions& options);
