@@ -55,10 +55,7 @@ bool isConstant(const SparseVolume& volume) {
 class Choice {
  public:
   Choice(const Job& job, const VoxelSearch::Goal& goal)
-      : job_(job),
-        wanted_(representationOf(job)),
-        goal_(goal),
-        fitsInTime_(planOf(job).fitsInTime) {}
+      : job_(job), wanted_(representationOf(job)), goal_(goal), plan_(planOf(job)) {}
 
   /// \param share        share of the voxels' bytes that ellipsoids must be expected to stay below
   /// \param smallEnough  bytes of voxels below which no ellipsoids are tried
@@ -67,7 +64,7 @@ class Choice {
     if (isConstant(job_.input.source))
       return asConversion(exactVoxels(job_), {}, FitEnd::kPsnrReached);
     voxels_.emplace(job_, goal_);
-    if (wanted_ == Representation::kVoxels || !fitsInTime_) return completeVoxels();
+    if (wanted_ == Representation::kVoxels || !plan_.fitsInTime) return completeVoxels();
     ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.psnr = goal_.psnr});
     const auto expected = estimateAndDraft(share, smallEnough);
     if (isCancelled(job_)) return bestSoFar();
@@ -76,7 +73,9 @@ class Choice {
     const double margin = expected->estimated ? kTuning.estimateMargin : 1.0;
     const auto below = std::uint64_t(margin * share * double(expected->bytes));
     figures_ = Candidate{ellipsoids_->expectedBytes(), *goal_.psnr, true, seconds_};
-    if (!ellipsoids_->mayStayBelow(below)) return completeVoxels();
+    if (!ellipsoids_->mayStayBelow(below) ||
+        expected->bytes < figures_->bytes + leastSaving(plan_.wholeIterations))
+      return completeVoxels();
     completeEllipsoids();
     const bool reached = conversion_ && *figures_->psnr >= *goal_.psnr;
     if (reached && margin * double(figures_->bytes) < double(expected->bytes))
@@ -92,7 +91,7 @@ class Choice {
     if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
     voxels_.emplace(job_, goal_);
     if (wanted_ == Representation::kVoxels || exactFits()) return completeVoxels();
-    if (!fitsInTime_ && voxels_->estimate()) return completeVoxels();
+    if (!plan_.fitsInTime && voxels_->estimate()) return completeVoxels();
     ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.bytes = goal_.bytes});
     seconds_ += secondsOf([&] { ellipsoids_->draft(); });
     figures_ = Candidate{*goal_.bytes, ellipsoids_->expectedPsnr(), true, seconds_};
@@ -127,6 +126,15 @@ class Choice {
   /// voxels. Those of smaller volumes are soon tried, and often show that no fit is needed.
   static constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
 
+  /// Bytes that fits of so many iterations must save to be worth their time, which on a GPU is short.
+  std::uint64_t leastSaving(double iterations) const {
+    if (isOnGpu()) return 0;
+    const double work = iterations * double(job_.input.source.brickCount());
+    return std::uint64_t(kTuning.bytesPerWork * work / effortFactor(job_.options.effort));
+  }
+
+  bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
+
   UsageError tooSmall(std::uint64_t needed) const {
     const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
                                          : "has no voxels of that size";
@@ -152,8 +160,7 @@ class Choice {
   /// Tries voxels on a sample and makes the short fits: at the same time if a GPU makes these, and one
   /// after the other otherwise, so that the fits know what they have to stay below.
   std::optional<Candidate> estimateAndDraft(double share, std::uint64_t smallEnough) {
-    const bool onGpu = job_.options.fit.device.kind == DeviceKind::kCuda &&
-                       activeVoxelCount(job_.input.source) >= kMinDraftedVoxels;
+    const bool onGpu = isOnGpu() && activeVoxelCount(job_.input.source) >= kMinDraftedVoxels;
     std::optional<Candidate> expected;
     const auto draft = [&](const CancelToken* cancel) {
       seconds_ += secondsOf([&] {
@@ -166,7 +173,8 @@ class Choice {
     const auto estimate = [&] { return unlessCancelled([&] { return voxels_->estimate(); }); };
     if (!onGpu) {
       expected = estimate();
-      if (!expected || expected->bytes < smallEnough) return expected;
+      const auto least = leastSaving(plan_.wholeIterations + 2.0 * plan_.shortIterations);
+      if (!expected || expected->bytes < std::max(smallEnough, least)) return expected;
       ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
       draft(nullptr);
       return expected;
@@ -203,7 +211,7 @@ class Choice {
     Conversion conversion = asConversion(std::move(*voxels), figures_,
                                          goal_.psnr ? FitEnd::kPsnrReached : FitEnd::kScheduleDone);
     if (isCancelled(job_)) conversion.fit.end = FitEnd::kCancelled;
-    conversion.fitsTookTooLong = !fitsInTime_ && wanted_ == Representation::kAuto;
+    conversion.fitsTookTooLong = !plan_.fitsInTime && wanted_ == Representation::kAuto;
     return conversion;
   }
 
@@ -225,7 +233,7 @@ class Choice {
   const Job& job_;
   Representation wanted_;
   VoxelSearch::Goal goal_;
-  bool fitsInTime_;       ///< false: a fit would take longer than the effort allows
+  Plan plan_;
   double seconds_ = 0.0;  ///< wall-clock seconds that all fits took together
   std::optional<VoxelSearch> voxels_;
   std::optional<EllipsoidSearch> ellipsoids_;
