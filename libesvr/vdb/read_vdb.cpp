@@ -576,8 +576,11 @@ VdbSummary inspectOpenVdb(InputFile& file) {
   Archive archive(file);
   VdbSummary summary{"OpenVDB", file.size(), archive.metadata(), {}};
   Surveys surveys;
-  for (std::size_t place = 0; place < archive.entries().size(); ++place)
-    summary.grids.push_back(std::move(listGrid(archive, place, surveys).summary));
+  for (std::size_t place = 0; place < archive.entries().size(); ++place) {
+    ListedGrid listed = listGrid(archive, place, surveys);
+    listed.summary.metadata = withoutFileStatistics(std::move(listed.head.metadata));
+    summary.grids.push_back(std::move(listed.summary));
+  }
   summary.directory = archive.directory();
   return summary;
 }
@@ -627,9 +630,10 @@ namespace esvr {
 GridSummary inspectCarried(const CarriedGrid& grid) {
   vdb::InputFile file(std::span(grid.bytes));
   vdb::Archive archive(file, grid);
-  GridSummary summary = vdb::listGrid(archive, 0).summary;
-  summary.uniqueName = shownName(summary.name);
-  return summary;
+  vdb::ListedGrid listed = vdb::listGrid(archive, 0);
+  listed.summary.uniqueName = shownName(listed.summary.name);
+  listed.summary.metadata = vdb::withoutFileStatistics(std::move(listed.head.metadata));
+  return std::move(listed.summary);
 }
 
 VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {
