@@ -1,4 +1,9 @@
 """Volumes become arrays of xarray and masked arrays of NumPy, and come back."""
+import os
+import pathlib
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -78,6 +83,14 @@ def test_a_turned_grid_has_indices_as_coordinates():
 def test_other_arrays_are_refused(array, words):
     with pytest.raises(esvr.UsageError, match=words):
         esvr.Volume.from_xarray(array)
+
+
+def test_nothing_of_this_is_loaded_before_it_is_needed():
+    """To load NumPy and xarray takes longer than to load the module."""
+    package = pathlib.Path(esvr.__file__).parent.parent
+    code = "import esvr, sys; print({'numpy', 'xarray', 'esvr.images'} & set(sys.modules))"
+    run = subprocess.run([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": str(package)}, text=True, capture_output=True)
+    assert run.stdout == "set()\n", run.stdout + run.stderr
 
 
 def test_wrong_options_of_arrays_are_refused():

@@ -1,11 +1,9 @@
 """Exchange with xarray.DataArray and with masked arrays of NumPy.
 
-xarray, and the modules of images with their rules for axes, are imported where they are needed, so that esvr starts without
-them.
+NumPy, xarray, and the modules of images with their rules for axes, are imported where they are needed, so that esvr starts
+without them.
 """
 import warnings
-
-import numpy as np
 
 from ._core import UsageError, Volume
 
@@ -62,6 +60,7 @@ def volume_of(array, *, background=0.0, threshold=None, name=None, grid_class="f
     background. All other elements are active, or, with a threshold, those that differ from the background by more than that. Units
     are kept in the metadata: value_unit, length_unit, and image_axis_units where the axes have no common unit of length.
     """
+    import numpy as np
     from .images.image import Axis, affine_of_steps
     kinds = axes_of(array)
     array = array.transpose(*(array.dims[kinds.index(axis)] for axis in SPACE))
@@ -82,6 +81,7 @@ def volume_of(array, *, background=0.0, threshold=None, name=None, grid_class="f
 def masked_of(volume, box=None):
     """The voxels of a box as a masked array of NumPy, of shape (nx, ny, nz): inactive voxels are masked. Volume.from_numpy takes
     such an array; with active=~array.mask, voxels that have the value of the background stay active."""
+    import numpy as np
     return np.ma.MaskedArray(volume.to_numpy(box), mask=~volume.active(box), fill_value=volume.background)
 
 
@@ -91,6 +91,7 @@ def array_of(volume, box=None, *, masked=True):
     Inactive voxels are NaN, or have the background if masked is false. Coordinates are those of the world if the transform scales
     and shifts only, else indices of voxels, and the attribute transform has the 4 x 4 matrix, row by row.
     """
+    import numpy as np
     import xarray
     first, last = box or volume.box or ((0, 0, 0), (0, 0, 0))
     box = (tuple(first), tuple(last))
