@@ -283,6 +283,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kCheckSchema = "esvr-check";
 constexpr int kCheckVersion = 1;
+constexpr std::size_t kWidth = 100;  // columns of the table
 
 void printFigures(const CheckRecord& record, std::ostream& out) {
   if (record.grids.empty()) return;
@@ -303,7 +304,7 @@ void printFigures(const CheckRecord& record, std::ostream& out) {
     }
     table.add(row);
   }
-  table.print(out);
+  table.print(out, kWidth);
 }
 
 void printLines(std::ostream& out, const std::string& prefix,

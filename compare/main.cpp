@@ -2,11 +2,14 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "compare/check.h"
 #include "compare/curves.h"
 #include "compare/options.h"
 #include "compare/table.h"
+#include "esvr/did_you_mean.h"
+#include "esvr/error.h"
 #include "programs/command_line.h"
 #include "programs/run_main.h"
 
@@ -30,6 +33,8 @@ esvr::cli::CommandLine overview() {
   return line;
 }
 
+const std::vector<std::string> kCommands{"check", "table", "curves"};
+
 void run(int argc, const char* const* argv) {
   const std::string_view command = argc > 1 ? argv[1] : "";
   if (command == "check") {
@@ -46,7 +51,8 @@ void run(int argc, const char* const* argv) {
   }
   if (!command.empty() && command.front() != '-')
     throw esvr::UsageError("unknown command '" + std::string(command) +
-                           "'; the commands are check, table and curves");
+                           "'; the commands are check, table and curves" +
+                           esvr::didYouMean(command, kCommands));
   (void)overview().parse(argc, argv);
 }
 

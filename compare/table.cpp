@@ -172,8 +172,7 @@ void readRows(const cli::Arguments& a, TableOptions& options) {
     else if (word == "zfp")
       options.zfp = true;
     else if (word != "none")
-      throw UsageError("--rows takes lossless, quantised, matched, zfp or none, not '" + word +
-                       "'");
+      cli::refuseWord("rows", word, {"lossless", "quantised", "matched", "zfp", "none"});
   }
   for (const auto& text : a.find<Words>("row").value_or(Words{}))
     options.settings.push_back(parseBaseline(text));

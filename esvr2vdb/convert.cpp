@@ -167,18 +167,11 @@ void checkFiles(const Options& options) {
 
 bool writesNano(const Options& options) { return options.output.extension() == ".nvdb"; }
 
-/// Why the output cannot hold carried grids; null if it can.
-const char* whyNoCarried(const Options& options) {
+/// Why the output cannot hold a grid; empty if it can.
+std::string whyNot(const EsvrFile& file, const GridOfFile& grid, const Options& options) {
+  if (!grid.isCarried) return "";
   if (!readsAll(options)) return "--lod, --max-ellipsoids and --bbox cannot cut a carried grid";
-  if (writesNano(options)) return "a NanoVDB file cannot hold a carried grid";
-  return nullptr;
-}
-
-/// Why the output cannot hold a grid; null if it can.
-const char* whyNot(const GridOfFile& grid, const Options& options) {
-  if (grid.isCarried) return whyNoCarried(options);
-  if (grid.isVector && writesNano(options)) return "vectors are not written to NanoVDB files";
-  return nullptr;
+  return writesNano(options) ? whyNotNano(&file.carried[grid.index]) : "";
 }
 
 /// Restricts what is read to the named grids. Only the records of the file are read for this.
@@ -212,12 +205,12 @@ EsvrFile read(const Options& options, const cli::Log& log) {
 /// The chosen grids that the output can hold. Says which of them are left out.
 /// \throws UsageError  a grid that it cannot hold is named
 /// \throws BadInput  no grid is left, or the file has none and the output needs one
-std::vector<ListedGrid> writable(const std::vector<ListedGrid>& chosen, const Options& options,
-                                 const cli::Log& log) {
+std::vector<ListedGrid> writable(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
+                                 const Options& options, const cli::Log& log) {
   std::vector<ListedGrid> kept;
   for (const ListedGrid& grid : chosen) {
-    const char* why = whyNot(grid.grid, options);
-    if (!why) {
+    const std::string why = whyNot(file, grid.grid, options);
+    if (why.empty()) {
       kept.push_back(grid);
       continue;
     }
@@ -382,7 +375,7 @@ std::vector<ComparedGrid> counterparts(const EsvrFile& file, const std::vector<L
 }  // namespace
 
 ReadLimits limitsOf(const Options& options) {
-  return {options.memory.maxBytes, options.memory.voxels, whyNoCarried(options) == nullptr};
+  return {options.memory.maxBytes, options.memory.voxels, readsAll(options)};
 }
 
 void convert(const Options& options) {
@@ -403,7 +396,7 @@ void convertFile(const Options& options, const CancelToken& cancel, const cli::L
 void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
   if (writesSplats(options)) return exportSplats(options, file, log);
-  const auto chosen = writable(chooseGrids(options.input, file, options.grids), options, log);
+  const auto chosen = writable(file, chooseGrids(options.input, file, options.grids), options, log);
   cli::WatchedInputs watched;
   if (options.reference) watched.add(*options.reference);
   std::vector<ComparedGrid> compared;

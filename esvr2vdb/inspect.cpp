@@ -13,10 +13,13 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/sequence_file.h"
+#include "esvr/splats.h"
 #include "esvr/vdb_io.h"
+#include "esvr2vdb/list_notes.h"
 #include "programs/messages.h"
 #include "programs/names.h"
 #include "programs/sequence.h"
+#include "programs/splat_input.h"
 
 namespace esvr::esvr2vdb {
 namespace {
@@ -46,11 +49,44 @@ void printDetails(const VdbSummary& file) {
 void listVdb(const Options& options) {
   const VdbSummary file = inspectVdb(options.input);
   std::cout << cli::printable(options.input.string()) << ": " << file.format << ", "
-            << file.fileBytes << " bytes" << (file.grids.empty() ? ", no grid" : "") << "\n\n";
+            << file.fileBytes << " bytes" << (file.grids.empty() ? ", no grid" : "") << '\n';
+  printFileNotes(file.metadata, std::cout);
+  std::cout << '\n';
   printGrids(file);
+  GridNotes notes;
+  for (const GridSummary& grid : file.grids) notes.add(grid.uniqueName, grid.metadata);
+  notes.print(std::cout);
   if (options.verbosity != cli::Verbosity::kVerbose) return;
   std::cout << '\n';
   printDetails(file);
+}
+
+// A file of splats.
+
+/// Prints what a file of splats holds. All of it is read.
+void listSplats(const Options& options) {
+  const SplatFile file = readSplats(options.input, {.maxBytes = options.memory.maxBytes});
+  const Splats& splats = file.scene.splats;
+  std::cout << cli::printable(options.input.string()) << ": splats, "
+            << fs::file_size(options.input) << " bytes\n\n";
+  cli::Table table({"splats", "left out", "colors", "place in the world", "density scale"});
+  const char* const colors = file.hasHigherDegrees ? "by direction" : "of degree 0";
+  table.add({std::to_string(file.inFile), std::to_string(file.dropped),
+             splats.hasColors() ? colors : "-", file.hasPlacement ? "known" : "-",
+             cli::shortNumber(file.scene.densityScale)});
+  table.print(std::cout);
+}
+
+// Metadata.
+
+/// The metadata of a grid. That of vectors is with their first component, and that of a carried grid is in
+/// its bytes, which may not have been read.
+std::vector<MetaItem> metadataOf(const EsvrFile& file, const ListedGrid& listed) {
+  const std::size_t index = listed.grid.index;
+  if (!listed.grid.isCarried)
+    return file.grids[listed.grid.isVector ? file.vectors[index].first : index].descriptor.metadata;
+  const CarriedGrid& carried = file.carried[index];
+  return carried.bytes.empty() ? std::vector<MetaItem>() : inspectCarried(carried).metadata;
 }
 
 // A sequence.
@@ -60,21 +96,30 @@ std::vector<std::string> rowOf(const SequenceFrame& frame) {
           frame.dependsOnPrevious ? "frame before" : "-"};
 }
 
-/// The names of the grids of a file; "-" if it has none.
-std::string gridsIn(const fs::path& path, const Options& options) {
+/// What the file of a frame says of itself.
+struct FrameFile {
+  std::string grids;  ///< their names; "-" if there are none
+  std::string notes;  ///< of the file's metadata
+};
+
+FrameFile inspectFrame(const fs::path& path, const Options& options) {
   std::vector<std::string> names;
+  FrameFile frame;
   if (path.extension() == ".esvr") {
     // The grids' records suffice, so that nothing is decoded.
     ReadPart wanted{.limits = limitsOf(options)};
     wanted.grids.emplace();
-    for (const ListedGrid& grid : listedGrids(readEsvrPart(path, wanted).file))
-      names.push_back(grid.name);
+    const EsvrFile file = readEsvrPart(path, wanted).file;
+    for (const ListedGrid& grid : listedGrids(file)) names.push_back(grid.name);
+    frame.notes = notesOf(file.metadata);
   } else {
-    for (const GridSummary& grid : inspectVdb(path).grids) names.push_back(grid.uniqueName);
+    const VdbSummary file = inspectVdb(path);
+    for (const GridSummary& grid : file.grids) names.push_back(grid.uniqueName);
+    frame.notes = notesOf(file.metadata);
   }
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "-" : text;
+  for (const std::string& name : names) frame.grids += (frame.grids.empty() ? "" : ", ") + name;
+  if (frame.grids.empty()) frame.grids = "-";
+  return frame;
 }
 
 /// Prints a row for the file of each frame of a pattern.
@@ -84,11 +129,14 @@ void listFrames(const Options& options, const cli::FramePattern& pattern) {
   cli::Table table({"frame", "bytes", "grids"});
   std::vector<cli::FrameNumber> failed;
   std::optional<Error> first;
+  std::string notes;  // of the first frame that has any
   for (const cli::FrameNumber frame : listing.frames) {
     const fs::path path = pattern.toRead(frame);
     try {
-      std::string grids = gridsIn(path, options);
-      table.add({std::to_string(frame), std::to_string(fs::file_size(path)), std::move(grids)});
+      FrameFile file = inspectFrame(path, options);
+      table.add(
+          {std::to_string(frame), std::to_string(fs::file_size(path)), std::move(file.grids)});
+      if (notes.empty()) notes = std::move(file.notes);
     } catch (const Error& error) {
       log.error("frame " + std::to_string(frame) + ": " + error.what());
       if (!first) first = error;
@@ -96,7 +144,8 @@ void listFrames(const Options& options, const cli::FramePattern& pattern) {
     }
   }
   std::cout << cli::printable(pattern.text()) << ": " << listing.frames.size()
-            << " frames, a file each\n\n";
+            << " frames, a file each\n"
+            << cli::printable(notes) << (notes.empty() ? "\n" : "\n\n");
   table.print(std::cout);
   if (const std::string hint = listing.hint(); !hint.empty())
     log.warning(pattern.text() + ": " + hint);
@@ -105,14 +154,20 @@ void listFrames(const Options& options, const cli::FramePattern& pattern) {
 
 /// Prints the frames of a file that holds a sequence.
 void listSequence(const Options& options) {
-  const SequenceReader reader(options.input);
+  const SequenceReader reader(options.input, limitsOf(options));
+  const EsvrFile first = reader.propertiesOfFirst();
   const EsvrSummary summary = inspectEsvr(options.input);
   std::cout << cli::printable(options.input.string()) << ": .esvr format " << summary.versionMajor
             << '.' << summary.versionMinor << ", " << summary.fileBytes << " bytes, "
-            << reader.frames().size() << " frames in " << reader.groupCount() << " groups\n\n";
+            << reader.frames().size() << " frames in " << reader.groupCount() << " groups\n";
+  printFileNotes(first.metadata, std::cout);
+  std::cout << '\n';
   cli::Table table({"frame", "group", "bytes", "refers to"});
   for (const SequenceFrame& frame : reader.frames()) table.add(rowOf(frame));
   table.print(std::cout);
+  GridNotes notes;
+  for (const ListedGrid& grid : listedGrids(first)) notes.add(grid.name, metadataOf(first, grid));
+  notes.print(std::cout);
 }
 
 // An .esvr file.
@@ -234,6 +289,9 @@ void printGrids(const Listing& listing) {
     table.add(part.grid.isCarried ? rowOfCarried(listing, part) : rowOfStored(listing, part));
   }
   table.print(std::cout);
+  GridNotes notes;
+  for (const ListedGrid& grid : listing.grids) notes.add(grid.name, metadataOf(listing.file, grid));
+  notes.print(std::cout);
 }
 
 /// The name of a section's grid; "-" if it belongs to the file.
@@ -342,6 +400,7 @@ void list(const Options& options) {
     return listFrames(options, *pattern);
   const auto extension = options.input.extension();
   if (extension == ".vdb" || extension == ".nvdb") return listVdb(options);
+  if (cli::isSplatFile(options.input)) return listSplats(options);
   if (holdsSequence(options.input)) return listSequence(options);
   PartOfFile part = readForList(options);
   Listing listing{options,
@@ -356,7 +415,9 @@ void list(const Options& options) {
   std::cout << cli::printable(options.input.string()) << ": .esvr format "
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "
             << listing.summary.fileBytes << " bytes" << (listing.grids.empty() ? ", no grid" : "")
-            << "\n\n";
+            << '\n';
+  printFileNotes(listing.file.metadata, std::cout);
+  std::cout << '\n';
   printGrids(listing);
   std::cout << '\n';
   printSections(listing);

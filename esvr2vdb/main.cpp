@@ -34,14 +34,15 @@ cli::ProgramText programText() {
           "  esvr2vdb IN.####.esvr|IN.esvr OUT.####.vdb [--frames 1-100] ...\n"
           "  esvr2vdb IN.esvr OUT.ply|OUT.usda [-g NAME] [--colors C] [--density-scale D] ...\n"
           "  esvr2vdb IN.ply OUT.vdb [--voxel-size S] [--density-scale D] [--up A]\n"
-          "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb|IN.####.vdb\n"
+          "  esvr2vdb --list IN.esvr|IN.vdb|IN.nvdb|IN.ply|IN.####.vdb\n"
           "  esvr2vdb --check IN.esvr|IN.####.esvr",
       .notes =
           "IN and REF.vdb may be - for standard input, or a pipe.\n"
           "\n"
           "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of the "
-          "file and of its grids, and it gets no grids of vectors and no carried grids. --lod, "
-          "--max-ellipsoids and --bbox do not write carried grids either, because they cannot be "
+          "file and of its grids, and of carried grids it gets those of floats, doubles and "
+          "vectors. "
+          "--lod, --max-ellipsoids and --bbox do not write carried grids, because they cannot be "
           "cut. A warning names each grid that is left out, and naming such a grid with -g is an "
           "error.\n"
           "\n"
@@ -52,7 +53,9 @@ cli::ProgramText programText() {
           "narrow "
           "band are active.\n"
           "\n"
-          "--list counts bytes that several grids share for the first of them only. The table of "
+          "--list also prints the creator of a file or a grid, the frame rate (an item of metadata "
+          "such as fps or frame_rate) and every item whose name has the word unit or units. It "
+          "counts bytes that several grids share for the first of them only. The table of "
           "sections names the grid with which a section is shared.\n"
           "\n"
           "Splats have the optical depth of the grid (docs/splats.md): the extinction over a unit "
@@ -91,7 +94,7 @@ cli::CommandLine commandLine() {
   // clang-format off
   line.options().add_options()
     ("list", bool_switch(),
-     "list the grids of IN, which may be a VDB, and the sections of an .esvr file")
+     "list the grids of IN, which may be a VDB or splats, and the sections of an .esvr file")
     ("check", bool_switch(), "read all of IN.esvr, verify its checksums and print OK")
     ("grid,g", value<std::vector<std::string>>()->value_name("NAME")->composing(),
      "write this grid only; may be repeated; 'density[1]' is the second grid of that name")

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <utility>
 
+#include "esvr/did_you_mean.h"
 #include "programs/help_text.h"
 #include "programs/memory.h"
 
@@ -155,6 +156,14 @@ std::vector<OptionGroup> CommandLine::groups() const {
   return {{"OPTIONS", &own_}, {"COMMON OPTIONS", &common_}};
 }
 
+/// The names of all options with their dashes.
+std::vector<std::string> CommandLine::longNames() const {
+  std::vector<std::string> names;
+  for (const OptionGroup& group : groups())
+    for (const auto& option : group.options->options()) names.push_back("--" + option->long_name());
+  return names;
+}
+
 std::optional<std::string> CommandLine::topic(const std::string& name) const {
   if (name == "man") return manPage(text_, groups());
   if (name == "options") return optionNames(groups());
@@ -210,6 +219,8 @@ std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) c
   Arguments arguments = withCommonOptions(std::move(values));
   collectInputs(volumeInputs_, textInputs_, arguments);
   return arguments;
+} catch (const po::unknown_option& error) {
+  throw UsageError(error.what() + didYouMean(error.get_option_name(), longNames()));
 } catch (const po::error& error) {
   throw UsageError(error.what());
 }

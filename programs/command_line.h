@@ -91,6 +91,7 @@ class CommandLine {
   [[nodiscard]] std::vector<std::string> words(const po::variables_map& values) const;
   [[nodiscard]] std::optional<std::string> topic(const std::string& name) const;
   [[nodiscard]] std::vector<OptionGroup> groups() const;
+  [[nodiscard]] std::vector<std::string> longNames() const;
   [[nodiscard]] po::options_description shown(bool isExpert) const;
   [[nodiscard]] bool hasExpertHelp() const { return !main_.empty() || !text_.details.empty(); }
   [[nodiscard]] std::string helpText() const;

@@ -45,6 +45,8 @@ void Log::warning(const std::string& message, const std::string& figure) const {
 
 namespace {
 
+using Rows = std::vector<std::vector<std::string>>;
+
 std::string formatted(const char* format, double value) {
   char text[64];
   std::snprintf(text, sizeof text, format, value);
@@ -66,15 +68,82 @@ void Table::add(std::vector<std::string> row) {
   rows_.push_back(std::move(row));
 }
 
-void Table::print(std::ostream& out) const {
-  constexpr const char* kGap = "  ";
-  std::vector<std::size_t> widths(rows_.front().size(), 0);
-  for (const auto& row : rows_)
-    for (std::size_t c = 0; c < row.size(); ++c) widths[c] = std::max(widths[c], row[c].size());
-  for (const auto& row : rows_) {
+namespace {
+
+constexpr const char* kGap = "  ";
+constexpr std::size_t kGapWidth = 2;
+
+/// The rows with a header of two lines: a title of several words is broken at the space that gives the
+/// shortest lines.
+Rows withTwoLines(const Rows& rows) {
+  Rows broken{rows.front(), rows.front()};
+  for (std::size_t c = 0; c < rows.front().size(); ++c) {
+    const std::string& title = rows.front()[c];
+    std::size_t best = std::string::npos, least = title.size();
+    for (std::size_t at = title.find(' '); at != std::string::npos; at = title.find(' ', at + 1)) {
+      const std::size_t longer = std::max(at, title.size() - at - 1);
+      if (longer < least) best = at, least = longer;
+    }
+    broken[0][c] = best == std::string::npos ? "" : title.substr(0, best);
+    broken[1][c] = best == std::string::npos ? title : title.substr(best + 1);
+  }
+  broken.insert(broken.end(), rows.begin() + 1, rows.end());
+  return broken;
+}
+
+/// A text of at most so many characters, with its begin and its end.
+std::string shortened(const std::string& text, std::size_t width) {
+  const std::size_t end = (width - 3) / 2, begin = width - 3 - end;
+  return text.size() <= width ? text
+                              : text.substr(0, begin) + "..." + text.substr(text.size() - end);
+}
+
+std::vector<std::size_t> widthsOf(const Rows& rows, std::size_t widestFirst) {
+  std::vector<std::size_t> widths(rows.front().size(), 0);
+  for (const auto& row : rows)
     for (std::size_t c = 0; c < row.size(); ++c)
-      out << (c == 0 ? "" : kGap) << padded(row[c], widths[c], c == 0);
+      if (c > 0 || row[c].size() <= widestFirst) widths[c] = std::max(widths[c], row[c].size());
+  return widths;
+}
+
+std::size_t sumOf(const std::vector<std::size_t>& widths) {
+  std::size_t sum = 0;
+  for (const std::size_t width : widths) sum += width + kGapWidth;
+  return sum - kGapWidth;
+}
+
+/// Prints the first column and those from `first` to before `end`.
+void printPart(const Rows& rows, const std::vector<std::size_t>& widths, std::size_t first,
+               std::size_t end, std::ostream& out) {
+  for (const auto& row : rows) {
+    const bool isLong = row[0].size() > widths[0];
+    if (isLong) out << row[0] << '\n';
+    out << padded(isLong ? "" : row[0], widths[0], true);
+    for (std::size_t c = first; c < end; ++c) out << kGap << padded(row[c], widths[c], false);
     out << '\n';
+  }
+}
+
+}  // namespace
+
+void Table::print(std::ostream& out) const {
+  const std::size_t columns = rows_.front().size();
+  printPart(rows_, widthsOf(rows_, std::string::npos), 1, columns, out);
+}
+
+void Table::print(std::ostream& out, std::size_t width) const {
+  const std::size_t columns = rows_.front().size();
+  if (sumOf(widthsOf(rows_, std::string::npos)) <= width) return print(out);
+  Rows rows = withTwoLines(rows_);
+  for (auto& row : rows) row[0] = printable(shortened(row[0], width));
+  const std::vector<std::size_t> widths = widthsOf(rows, width / 3);
+  for (std::size_t first = 1; first < columns;) {
+    std::size_t end = first, taken = widths[0];
+    while (end < columns && (end == first || taken + kGapWidth + widths[end] <= width))
+      taken += kGapWidth + widths[end++];
+    if (first > 1) out << '\n';
+    printPart(rows, widths, first, end, out);
+    first = end;
   }
 }
 

@@ -60,6 +60,10 @@ class Table {
   /// \throws std::logic_error  the row has other columns than the header
   void add(std::vector<std::string> row);
   void print(std::ostream& out) const;
+  /// Prints the table in at most so many columns of text: with headers of two lines if it is too wide,
+  /// and in several parts, each with the first column, if it still is. A text of the first column that
+  /// takes more than a third of the width has a line of its own, and is shortened if it takes all of it.
+  void print(std::ostream& out, std::size_t width) const;
 
  private:
   std::vector<std::vector<std::string>> rows_;

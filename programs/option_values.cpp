@@ -7,9 +7,18 @@
 #include <cmath>
 #include <cstdint>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 
 namespace esvr::cli {
+
+void refuseWord(const std::string& option, const std::string& given,
+                const std::vector<std::string>& words) {
+  std::string known;
+  for (const std::string& word : words) known += (known.empty() ? "" : ", ") + word;
+  throw UsageError("--" + option + " must be one of " + known + ", not '" + given + "'" +
+                   didYouMean(given, words));
+}
 
 std::vector<double> parseNumbers(const std::string& option, const std::string& text,
                                  std::size_t count) {

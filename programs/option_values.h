@@ -27,16 +27,20 @@ struct Choice {
   T value;
 };
 
+/// \throws UsageError  always: the text lists the words that the option takes, and names the nearest one
+[[noreturn]] void refuseWord(const std::string& option, const std::string& given,
+                             const std::vector<std::string>& words);
+
 /// The value of a word. \throws UsageError  the word is unknown; the message lists the known ones
 template <class T>
 T choose(const std::string& option, const std::string& given,
          std::initializer_list<Choice<T>> choices) {
-  std::string words;
+  std::vector<std::string> words;
   for (const auto& choice : choices) {
     if (given == choice.word) return choice.value;
-    words += (words.empty() ? "" : ", ") + std::string(choice.word);
+    words.emplace_back(choice.word);
   }
-  throw UsageError("--" + option + " must be one of " + words + ", not '" + given + "'");
+  refuseWord(option, given, words);
 }
 
 /// Parses a text like "1,-2.5,3e2" with `count` finite numbers.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "programs/option_values.h"
 #include "programs/video_file.h"
@@ -59,10 +60,13 @@ void readPart(const std::string& part, LookText& text, FurtherGrid& grid) {
     text.preset = value;
   else if (key == "range" && !value.empty())
     text.range = value;
-  else
+  else {
+    const std::vector<std::string> keys{"emission", "colors", "opacity", "tf", "preset", "range"};
     throw UsageError("'" + part +
                      "' must be emission, or one of colors, opacity, tf, preset and range with '=' "
-                     "and a value");
+                     "and a value" +
+                     didYouMean(key, keys));
+  }
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <sstream>
 #include <vector>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "programs/messages.h"
 #include "programs/option_values.h"
@@ -222,6 +223,17 @@ std::string paperHelp() {
   return out.str();
 }
 
+namespace {
+
+[[noreturn]] void refuseKey(const std::string& given) {
+  std::vector<std::string> names;
+  for (const Key& key : keys()) names.emplace_back(key.name);
+  throw UsageError("--paper has no key '" + given + "'; see --help paper" +
+                   didYouMean(given, names));
+}
+
+}  // namespace
+
 PaperMethod readPaperMethod(const std::vector<std::string>& given) {
   auto settings = settingsIn(given);
   PaperMethod method;
@@ -231,8 +243,7 @@ PaperMethod readPaperMethod(const std::vector<std::string>& given) {
     key.read(setting->second, method);
     settings.erase(setting);
   }
-  if (!settings.empty())
-    throw UsageError("--paper has no key '" + settings.begin()->first + "'; see --help paper");
+  if (!settings.empty()) refuseKey(settings.begin()->first);
   if (method.gaussian && (method.learnK || method.k != PaperMethod{}.k))
     throw UsageError("--paper: Gaussians have no k");
   return method;

@@ -7,6 +7,7 @@
 
 #include "core/device_choice.h"
 #include "core/parse_text.h"
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -80,7 +81,9 @@ Device chooseDevice(const std::string& text, const CudaProbe& probe) {
   if (text == "auto") return firstUsable(probe) ? requireUsable(probe) : Device{};
   if (const auto indices = cudaIndices(text); indices.size() == 1)
     return requireIndex(probe, indices.front());
-  throw UsageError("device '" + text + "' is none of auto, cpu, cuda, cuda:N");
+  const std::vector<std::string> known{"auto", "cpu", "cuda"};
+  throw UsageError("device '" + text + "' is none of auto, cpu, cuda, cuda:N" +
+                   didYouMean(text, known));
 }
 
 std::vector<Device> chooseDevices(const std::string& text, const CudaProbe& probe) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -285,7 +286,7 @@ void GridNames::refuse(const std::string& wanted, const std::filesystem::path& f
   const Places* places = withName(wanted);
   if (!places)
     throw BadInput(prefixOf(file) + "has no grid \"" + shownText(wanted, LineEnds::kReplace) +
-                   "\"; there are: " + quotedList(unique_));
+                   "\"; there are: " + quotedList(unique_) + didYouMean(wanted, unique_, "\""));
   std::string candidates;
   for (std::size_t n = 0; n < std::min(places->size(), kMostListed); ++n)
     candidates += (n == 0 ? "\"" : ", \"") + unique_[(*places)[n]] + "\" (grid " +

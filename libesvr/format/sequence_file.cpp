@@ -82,6 +82,15 @@ class SequenceReader::File {
     return inspectEsvr(bytesOf(indexOf(number)), frameName(source_.name(), number));
   }
 
+  [[nodiscard]] EsvrFile propertiesOfFirst() const {
+    if (frames_.empty()) return {};
+    ReadPart wanted{.limits = limits_};
+    wanted.grids.emplace();
+    const auto bytes = bytesOf(0);
+    const std::string name = frameName(source_.name(), frames_.front().number);
+    return decodePart(MemorySource(bytes, name), wanted).file;
+  }
+
  private:
   [[nodiscard]] std::size_t indexOf(std::int64_t number) const {
     const auto at = std::ranges::lower_bound(frames_, number, {}, &SequenceFrame::number);
@@ -137,6 +146,7 @@ std::size_t SequenceReader::groupCount() const { return file_->groupCount(); }
 std::uint64_t SequenceReader::fileBytes() const { return file_->fileBytes(); }
 const EsvrFile& SequenceReader::read(std::int64_t number) { return file_->read(number); }
 EsvrSummary SequenceReader::inspect(std::int64_t number) { return file_->inspect(number); }
+EsvrFile SequenceReader::propertiesOfFirst() const { return file_->propertiesOfFirst(); }
 std::uint64_t SequenceReader::bytesRead() const { return file_->bytesRead(); }
 
 // ---- The writer

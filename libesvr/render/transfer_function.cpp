@@ -11,6 +11,7 @@
 #include <span>
 
 #include "esvr/container.h"
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -443,7 +444,8 @@ Result named(std::span<const BuiltIn<Result>> all, const std::string& name, cons
     if (name == one.name) return one.make();
   std::string there;
   for (const auto& one : all) there += (there.empty() ? "" : ", ") + std::string(one.name);
-  throw UsageError("no " + std::string(what) + " '" + name + "'; there are " + there);
+  throw UsageError("no " + std::string(what) + " '" + name + "'; there are " + there +
+                   didYouMean(name, namesOf(all)));
 }
 
 }  // namespace

@@ -34,6 +34,10 @@ extern template class openvdb::Grid<openvdb::BoolTree>;
 
 namespace esvr::vdb {
 
+/// The tree of the type HalfGrid, which OpenVDB 13 has and older versions do not name. Files store its values
+/// as they do those of other types that half floats do not change, so that every version can read them.
+using HalfTree = openvdb::tree::Tree4<openvdb::math::half, 5, 4, 3>::Type;
+
 /// Registers OpenVDB's types. It is cheap after the first call and safe to call from any thread.
 void initializeOpenVdb();
 

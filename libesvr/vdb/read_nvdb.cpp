@@ -203,6 +203,15 @@ const nanovdb::GridData& gridData(const NanoBuffer& buffer) {
   return *reinterpret_cast<const nanovdb::GridData*>(buffer.data());
 }
 
+/// A number, or a component of a vector.
+template <class Value>
+auto numberOf(const Value& value, std::size_t component) {
+  if constexpr (std::is_arithmetic_v<Value>)
+    return value;
+  else
+    return value[int(component)];
+}
+
 /// The nodes of one grid. Coordinates follow from the positions of the nodes in the tree; the
 /// coordinates that the nodes hold are not used.
 template <class Build>
@@ -229,11 +238,17 @@ class NanoTree {
       damaged("a root node beyond its buffer");
   }
 
-  [[nodiscard]] double background() const { return double(root_->background()); }
+  [[nodiscard]] double background(std::size_t component) const {
+    return numberOf(root_->background(), component);
+  }
 
   /// Calls onLeaf(corner, leaf) and onTile(tile, isActive) for all leaves and tiles.
+  /// \param component  of the vectors of tiles
   template <class OnLeaf, class OnTile>
-  void visit(OnLeaf&& onLeaf, OnTile&& onTile) const {
+  void visit(std::size_t component, OnLeaf&& onLeaf, OnTile&& onTileOfGrid) const {
+    const auto onTile = [&](Coord corner, std::int32_t extent, const auto& value, bool isActive) {
+      onTileOfGrid(TileSource{corner, extent, numberOf(value, component)}, isActive);
+    };
     for (std::uint32_t i = 0; i < root_->data()->mTableSize; ++i) {
       const auto& tile = *root_->data()->tile(i);
       const auto origin = tile.origin();
@@ -241,7 +256,7 @@ class NanoTree {
       if (tile.isChild())
         visitUpper(*node<Upper>(root_, tile.child), corner, onLeaf, onTile);
       else
-        onTile({corner, kUpperExtent, double(tile.value)}, tile.state != 0);
+        onTile(corner, kUpperExtent, tile.value, tile.state != 0);
     }
   }
 
@@ -281,7 +296,7 @@ class NanoTree {
       if (data.mChildMask.isOn(n))
         visitLower(*node<Lower>(&upper, data.mTable[n].child), at, onLeaf, onTile);
       else
-        onTile({at, kLowerExtent, double(data.mTable[n].value)}, data.mValueMask.isOn(n));
+        onTile(at, kLowerExtent, data.mTable[n].value, data.mValueMask.isOn(n));
     }
   }
 
@@ -293,7 +308,7 @@ class NanoTree {
       if (data.mChildMask.isOn(n))
         onLeaf(at, leaf(lower, data.mTable[n].child));
       else
-        onTile({at, kBrickSide, double(data.mTable[n].value)}, data.mValueMask.isOn(n));
+        onTile(at, kBrickSide, data.mTable[n].value, data.mValueMask.isOn(n));
     }
   }
 
@@ -314,7 +329,11 @@ class NanoTree {
 /// Access to the leaves of NanoVDB for a brick filler. Their voxels are in voxelOffset order.
 template <class Leaf>
 struct NanoLeafAccess {
-  static auto value(const Leaf& leaf, int i) { return leaf.data()->getValue(std::uint32_t(i)); }
+  std::size_t component = 0;  ///< of vectors
+
+  [[nodiscard]] auto value(const Leaf& leaf, int i) const {
+    return numberOf(leaf.data()->getValue(std::uint32_t(i)), component);
+  }
   static BrickMask mask(const Leaf& leaf) {
     BrickMask mask;
     for (int i = 0; i < kBrickVoxels; ++i)
@@ -332,13 +351,15 @@ std::vector<Coord> brickCorners(const NanoTree<Build>& tree, const ReadOptions& 
     bricks += side * side * side;
     refuseTooLarge(bricks, options);
   };
-  tree.visit([&](Coord, const auto&) { count(kBrickSide); },
-             [&](const TileSource& tile, bool isActive) {
-               if (isActive) count(tile.extent);
-             });
+  tree.visit(
+      0, [&](Coord, const auto&) { count(kBrickSide); },
+      [&](const TileSource& tile, bool isActive) {
+        if (isActive) count(tile.extent);
+      });
   std::vector<Coord> corners;
   corners.reserve(bricks);
   tree.visit(
+      0,
       [&](Coord corner, const auto& leaf) {
         using Leaf = std::decay_t<decltype(leaf)>;
         if (NanoLeafAccess<Leaf>::mask(leaf).count() > 0) corners.push_back(corner);
@@ -351,15 +372,21 @@ std::vector<Coord> brickCorners(const NanoTree<Build>& tree, const ReadOptions& 
 
 /// False for quantised values, whose inactive ones are only near those of the source.
 template <class Build>
-constexpr bool kHasExactValues = std::is_floating_point_v<Build>;
+constexpr bool kHasExactValues =
+    std::is_floating_point_v<Build> || std::is_same_v<Build, nanovdb::Vec3f> ||
+    std::is_same_v<Build, nanovdb::Vec3d>;
 
+/// \param component  of a grid of vectors; 0 for others
 template <class Build>
-void readNanoAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGrid& grid) {
+void readNanoAs(const NanoBuffer& buffer, std::size_t component, const ReadOptions& options,
+                VolumeGrid& grid) {
   using Leaf = typename NanoTree<Build>::Leaf;
   using Access = NanoLeafAccess<Leaf>;
   const NanoTree<Build> tree(buffer);
-  grid.descriptor.background = tree.background();
-  const FillRules rules{narrowBackground(tree.background()),
+  const double background = tree.background(component);
+  const Access access{component};
+  grid.descriptor.background = background;
+  const FillRules rules{narrowBackground(background),
                         grid.descriptor.gridClass == GridClass::kLevelSet,
                         options.nonFinite,
                         options.nonFiniteValue,
@@ -368,13 +395,14 @@ void readNanoAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGrid
   auto corners = brickCorners(tree, options);
   SparseVolume& volume = grid.volume = layOutBricks(corners, rules, options.memory);
   FillTallies tallies{{.replacement = rules.replacement()},
-                      InactiveCounter(tree.background(), rules.levelSet)};
+                      InactiveCounter(background, rules.levelSet)};
   tree.visit(
+      component,
       [&](Coord corner, const Leaf& leaf) {
         if (Access::mask(leaf).count() == 0)
-          countInactiveLeaf(leaf, Access{}, rules, corner, tallies);
+          countInactiveLeaf(leaf, access, rules, corner, tallies);
         else
-          fillFromLeaf(leaf, Access{}, rules, brickAt(volume, corner), volume, tallies);
+          fillFromLeaf(leaf, access, rules, brickAt(volume, corner), volume, tallies);
       },
       [&](const TileSource& tile, bool isActive) {
         if (isActive)
@@ -385,6 +413,12 @@ void readNanoAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGrid
   refuseNonFinite(tallies.nonFinite, rules.nonFinite);
   grid.nonFiniteReplaced = tallies.nonFinite.count;
   grid.inactive = tallies.inactive.lostIn(volume);
+}
+
+/// The classes that NanoVDB shares with OpenVDB have the same numbers here.
+GridClass gridClassOf(std::uint32_t nanoClass) {
+  return nanoClass <= std::uint32_t(GridClass::kStaggered) ? GridClass(nanoClass)
+                                                           : GridClass::kUnknown;
 }
 
 /// The map as the simplest map of OpenVDB that is equal to it. NanoVDB stores an affine map only.
@@ -399,35 +433,45 @@ Transform transformOf(const NanoBuffer& buffer) {
 }
 
 /// Reads the grid in a buffer, without its name.
+/// \param component  of a grid of vectors; 0 for others
 /// \throws BadInput  the grid is damaged or has no active voxel; voxels are not finite
 /// \throws MemoryExceeded  it takes more than options.maxBytes
-VolumeGrid readNanoVoxels(const NanoBuffer& buffer, nanovdb::GridType type, GridClass gridClass,
+VolumeGrid readNanoVoxels(const NanoBuffer& buffer, const NanoEntry& entry, std::size_t component,
                           const ReadOptions& options) {
   using Type = nanovdb::GridType;
+  const auto type = Type(entry.gridType);
+  const bool isDouble = type == Type::Double || type == Type::Vec3d;
   VolumeGrid grid;
-  grid.descriptor.gridClass = gridClass;
-  grid.descriptor.valueType = type == Type::Double ? ValueType::kDouble : ValueType::kFloat;
+  grid.descriptor.name = entry.name;
+  grid.descriptor.gridClass = gridClassOf(entry.gridClass);
+  grid.descriptor.valueType = isDouble ? ValueType::kDouble : ValueType::kFloat;
   switch (type) {
     case Type::Float:
-      readNanoAs<float>(buffer, options, grid);
+      readNanoAs<float>(buffer, component, options, grid);
       break;
     case Type::Double:
-      readNanoAs<double>(buffer, options, grid);
+      readNanoAs<double>(buffer, component, options, grid);
+      break;
+    case Type::Vec3f:
+      readNanoAs<nanovdb::Vec3f>(buffer, component, options, grid);
+      break;
+    case Type::Vec3d:
+      readNanoAs<nanovdb::Vec3d>(buffer, component, options, grid);
       break;
     case Type::Fp4:
-      readNanoAs<nanovdb::Fp4>(buffer, options, grid);
+      readNanoAs<nanovdb::Fp4>(buffer, component, options, grid);
       break;
     case Type::Fp8:
-      readNanoAs<nanovdb::Fp8>(buffer, options, grid);
+      readNanoAs<nanovdb::Fp8>(buffer, component, options, grid);
       break;
     case Type::Fp16:
-      readNanoAs<nanovdb::Fp16>(buffer, options, grid);
+      readNanoAs<nanovdb::Fp16>(buffer, component, options, grid);
       break;
     case Type::FpN:
-      readNanoAs<nanovdb::FpN>(buffer, options, grid);
+      readNanoAs<nanovdb::FpN>(buffer, component, options, grid);
       break;
     default:
-      throw BadInput("its values are of type " + nanoValueType(std::uint32_t(type)));
+      throw BadInput("its values are of type " + nanoValueType(entry.gridType));
   }
   grid.descriptor.transform = transformOf(buffer);
   return grid;
@@ -443,10 +487,19 @@ bool isScalarFloatNano(std::uint32_t gridType) {
          type == Type::Fp16 || type == Type::FpN;
 }
 
-/// The classes that NanoVDB shares with OpenVDB have the same numbers here.
-GridClass gridClassOf(std::uint32_t nanoClass) {
-  return nanoClass <= std::uint32_t(GridClass::kStaggered) ? GridClass(nanoClass)
-                                                           : GridClass::kUnknown;
+bool isVectorNano(std::uint32_t gridType) {
+  const auto type = nanovdb::GridType(gridType);
+  return type == nanovdb::GridType::Vec3f || type == nanovdb::GridType::Vec3d;
+}
+
+/// The reason, for the user, why a grid cannot be fitted; else empty.
+std::string reasonToSkip(const GridSummary& grid, bool hasVectors) {
+  if (!grid.isScalar && !hasVectors) return notAFloatType(grid.valueType);
+  if (grid.activeVoxels == 0) return "it has no active voxel";
+  if (grid.isScalar) return {};
+  if (grid.isVector)
+    return "its values are vectors (" + grid.valueType + "), which are fitted by components";
+  return "it is a level set of vectors, which cannot be fitted";
 }
 
 GridSummary summarise(const NanoEntry& entry) {
@@ -458,9 +511,9 @@ GridSummary summarise(const NanoEntry& entry) {
   grid.activeBox = entry.activeBox;
   grid.storedBytes = entry.storedBytes;
   grid.isScalar = isScalarFloatNano(entry.gridType);
-  grid.skipReason = grid.isScalar ? "" : notAFloatType(grid.valueType);
-  if (grid.skipReason.empty() && entry.activeVoxels == 0)
-    grid.skipReason = "it has no active voxel";
+  const bool hasVectors = isVectorNano(entry.gridType);
+  grid.isVector = hasVectors && entry.activeVoxels > 0 && grid.gridClass != GridClass::kLevelSet;
+  grid.skipReason = reasonToSkip(grid, hasVectors);
   grid.whyNotCarried = "only the grids of .vdb files can be carried unchanged";
   return grid;
 }
@@ -480,21 +533,75 @@ VdbSummary inspectNanoVdb(InputFile& file) {
   return summary;
 }
 
+namespace {
+
+/// The directory of a file and the grid at a place in it.
+struct NanoPlace {
+  std::vector<NanoEntry> entries;
+  std::size_t place;
+
+  NanoPlace(InputFile& file, std::size_t at) : entries(readNanoDirectory(file)), place(at) {
+    requireGrid(place, entries.size());
+  }
+  [[nodiscard]] const NanoEntry& entry() const { return entries[place]; }
+  [[nodiscard]] std::string uniqueName() const {
+    std::vector<std::string> names;
+    for (const NanoEntry& entry : entries) names.push_back(entry.name);
+    return GridNames(std::move(names)).unique(place);
+  }
+};
+
+/// \throws BadInput  the grid has not GridSummary::isVector
+void requireVectors(const NanoPlace& at) {
+  const GridSummary grid = summarise(at.entry());
+  if (!grid.isVector)
+    throw BadInput(grid.isScalar ? "its values are numbers, not vectors" : grid.skipReason);
+}
+
+}  // namespace
+
 VolumeGrid readNanoVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options) {
-  const auto entries = readNanoDirectory(file);
-  requireGrid(place, entries.size());
-  std::vector<std::string> names;
-  for (const NanoEntry& entry : entries) names.push_back(entry.name);
-  return inGrid(GridNames(std::move(names)).unique(place), [&] {
-    const NanoEntry& entry = entries[place];
+  const NanoPlace at(file, place);
+  return inGrid(at.uniqueName(), [&] {
+    const NanoEntry& entry = at.entry();
     if (!isScalarFloatNano(entry.gridType))
-      throw BadInput(notAFloatType(nanoValueType(entry.gridType)));
-    const NanoBuffer buffer = readNanoBuffer(file, entry, options.maxBytes);
-    VolumeGrid grid = readNanoVoxels(buffer, nanovdb::GridType(entry.gridType),
-                                     gridClassOf(entry.gridClass), options);
-    grid.descriptor.name = entry.name;
-    return grid;
+      throw BadInput(isVectorNano(entry.gridType) ? summarise(entry).skipReason
+                                                  : notAFloatType(nanoValueType(entry.gridType)));
+    return readNanoVoxels(readNanoBuffer(file, entry, options.maxBytes), entry, 0, options);
   });
+}
+
+VolumeGrid readNanoVdbComponent(InputFile& file, std::size_t place, std::size_t component,
+                                const ReadOptions& options) {
+  const NanoPlace at(file, place);
+  inGrid(at.uniqueName(), [&] { requireVectors(at); });
+  VolumeGrid grid = inGrid(componentName(at.uniqueName(), component), [&] {
+    const NanoBuffer buffer = readNanoBuffer(file, at.entry(), options.maxBytes);
+    return readNanoVoxels(buffer, at.entry(), component, options);
+  });
+  grid.descriptor.name = componentName(grid.descriptor.name, component);
+  return grid;
+}
+
+VectorGrid readNanoVdbVector(InputFile& file, std::size_t place, ReadOptions options) {
+  const NanoPlace at(file, place);
+  inGrid(at.uniqueName(), [&] { requireVectors(at); });
+  const NanoBuffer buffer =
+      inGrid(at.uniqueName(), [&] { return readNanoBuffer(file, at.entry(), options.maxBytes); });
+  VectorGrid vectors;
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    VolumeGrid component = inGrid(componentName(at.uniqueName(), c),
+                                  [&] { return readNanoVoxels(buffer, at.entry(), c, options); });
+    // The later components get the memory that this one leaves.
+    const std::uint64_t bytes = component.volume.values.size() * sizeof(float);
+    if (!options.memory.isInFile(bytes)) options.maxBytes -= std::min(options.maxBytes, bytes);
+    vectors.background[c] = component.descriptor.background;
+    if (c == 0) vectors.descriptor = std::move(component.descriptor);
+    vectors.components[c] = std::move(component.volume);
+    vectors.nonFiniteReplaced += component.nonFiniteReplaced;
+    vectors.inactive.add(component.inactive.ofComponent(c));
+  }
+  return vectors;
 }
 
 }  // namespace esvr::vdb

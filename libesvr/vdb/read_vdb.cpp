@@ -32,11 +32,13 @@ using openvdb::GridBase;
 
 // Trees and their leaves
 
-/// A component of a value; of a number, itself.
+/// A component of a value; of a number, itself, and of a half its float.
 template <class Value>
 auto componentOf(const Value& value, std::size_t component) {
   if constexpr (openvdb::VecTraits<Value>::IsVec)
     return value[int(component)];
+  else if constexpr (std::is_same_v<Value, openvdb::math::half>)
+    return float(value);
   else
     return value;
 }
@@ -57,9 +59,11 @@ struct LeafAccess {
   }
 };
 
+bool isHalfTree(const ArchiveEntry& entry) { return entry.treeType == HalfTree::treeType(); }
+
 bool isScalarFloatTree(const ArchiveEntry& entry) {
   return entry.treeType == openvdb::FloatTree::treeType() ||
-         entry.treeType == openvdb::DoubleTree::treeType();
+         entry.treeType == openvdb::DoubleTree::treeType() || isHalfTree(entry);
 }
 
 bool isVectorTree(const ArchiveEntry& entry) {
@@ -363,6 +367,7 @@ AnyPackedVoxels readPackedVoxels(Archive& archive, const ArchiveEntry& entry,
   const auto is = [&](const openvdb::Name& type) { return entry.treeType == type; };
   if (is(openvdb::DoubleTree::treeType()))
     return readPackedAs<double, openvdb::DoubleTree>(archive, located, options);
+  if (isHalfTree(entry)) return readPackedAs<float, HalfTree>(archive, located, options);
   if (is(openvdb::Int32Tree::treeType()))
     return readPackedAs<std::int32_t, openvdb::Int32Tree>(archive, located, options);
   if (is(openvdb::Int64Tree::treeType()))
@@ -446,8 +451,9 @@ GridSummary summarise(Archive& archive, const ArchiveEntry& entry, const GridHea
                       Surveys& surveys) {
   GridSummary grid;
   grid.name = stringValue(head.metadata, GridBase::META_GRID_NAME);
-  grid.valueType = entry.valueType();
-  grid.savedAsHalf = entry.savedAsHalf;
+  // A HalfGrid is like a grid of floats that is saved as half, which every version of OpenVDB reads.
+  grid.valueType = isHalfTree(entry) ? "float" : entry.valueType();
+  grid.savedAsHalf = entry.savedAsHalf || isHalfTree(entry);
   grid.storedBytes = entry.gridBytes;
   grid.gridClass = gridClassOf(stringValue(head.metadata, GridBase::META_GRID_CLASS));
   if (!countFromStatistics(head.metadata, grid)) countFromTree(archive, entry, surveys, grid);
@@ -513,6 +519,8 @@ VolumeGrid readTree(Archive& archive, const ListedGrid& listed, std::size_t comp
   const auto is = [&](const openvdb::Name& type) { return entry.treeType == type; };
   if (is(openvdb::DoubleTree::treeType()))
     readVoxelsAs<openvdb::DoubleTree>(archive, located, component, options, grid);
+  else if (isHalfTree(entry))
+    readVoxelsAs<HalfTree>(archive, located, component, options, grid);
   else if (is(openvdb::Vec3STree::treeType()))
     readVoxelsAs<openvdb::Vec3STree>(archive, located, component, options, grid);
   else if (is(openvdb::Vec3DTree::treeType()))
@@ -576,8 +584,11 @@ VdbSummary inspectOpenVdb(InputFile& file) {
   Archive archive(file);
   VdbSummary summary{"OpenVDB", file.size(), archive.metadata(), {}};
   Surveys surveys;
-  for (std::size_t place = 0; place < archive.entries().size(); ++place)
-    summary.grids.push_back(std::move(listGrid(archive, place, surveys).summary));
+  for (std::size_t place = 0; place < archive.entries().size(); ++place) {
+    ListedGrid listed = listGrid(archive, place, surveys);
+    listed.summary.metadata = withoutFileStatistics(std::move(listed.head.metadata));
+    summary.grids.push_back(std::move(listed.summary));
+  }
   summary.directory = archive.directory();
   return summary;
 }
@@ -627,9 +638,10 @@ namespace esvr {
 GridSummary inspectCarried(const CarriedGrid& grid) {
   vdb::InputFile file(std::span(grid.bytes));
   vdb::Archive archive(file, grid);
-  GridSummary summary = vdb::listGrid(archive, 0).summary;
-  summary.uniqueName = shownName(summary.name);
-  return summary;
+  vdb::ListedGrid listed = vdb::listGrid(archive, 0);
+  listed.summary.uniqueName = shownName(listed.summary.name);
+  listed.summary.metadata = vdb::withoutFileStatistics(std::move(listed.head.metadata));
+  return std::move(listed.summary);
 }
 
 VolumeGrid readGrid(const CarriedGrid& grid, const ReadOptions& options) {

@@ -28,6 +28,9 @@ std::vector<CarriedGrid> readOpenVdbCarried(InputFile& file, std::span<const std
 bool beginsAsNanoVdb(InputFile& file);
 VdbSummary inspectNanoVdb(InputFile& file);
 VolumeGrid readNanoVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options);
+VolumeGrid readNanoVdbComponent(InputFile& file, std::size_t place, std::size_t component,
+                                const ReadOptions& options);
+VectorGrid readNanoVdbVector(InputFile& file, std::size_t place, ReadOptions options);
 
 // Of both (vdb_io.cpp).
 /// \throws BadInput  the file has no grid at this place

@@ -17,6 +17,7 @@ constexpr auto kOther = ValueLayout::Leaves::kOther, kFixed = ValueLayout::Leave
 constexpr std::array kKnownTypes{
     KnownType{"float", 4, 1, true},
     KnownType{"double", 8, 1, true},
+    KnownType{"half", 2},  // HalfGrid of OpenVDB 13
     KnownType{"vec2s", 4, 2, true},
     KnownType{"vec2d", 8, 2, true},
     KnownType{"vec3s", 4, 3, true},

@@ -54,16 +54,6 @@ FileFormat formatNamedBy(const std::filesystem::path& path) {
   throw UsageError(path.string() + ": the extension must be .vdb or .nvdb");
 }
 
-/// Opens a file whose grids may be vectors. NanoVDB's vectors are not read.
-template <class Read>
-auto readVectors(const std::filesystem::path& path, const Read& read) {
-  return readingFrom(path, [&](InputFile& file) {
-    if (formatOf(file) != FileFormat::kOpenVdb)
-      throw BadInput("is a NanoVDB file, whose grids of vectors cannot be read");
-    return read(file);
-  });
-}
-
 std::vector<std::string> storedNames(const VdbSummary& summary) {
   std::vector<std::string> names;
   for (const GridSummary& grid : summary.grids) names.push_back(grid.name);
@@ -140,6 +130,10 @@ PackedGrid readPacked(const std::filesystem::path& path, std::size_t place,
       return vdb::readOpenVdbPacked(file, place, vdb::currently(path, options));
     ReadOptions anyNumber = options;
     anyNumber.allowEmpty = true;
+    const VdbSummary summary = vdb::inspectNanoVdb(file);
+    vdb::requireGrid(place, summary.grids.size());
+    if (summary.grids[place].isVector)
+      return packed(vdb::readNanoVdbVector(file, place, anyNumber));
     const VolumeGrid grid = vdb::readNanoVdbGrid(file, place, anyNumber);
     return packed(grid.descriptor, grid.volume);
   });
@@ -155,8 +149,10 @@ PackedGrid readPacked(const std::filesystem::path& path, const std::string& name
 
 VolumeGrid readComponent(const std::filesystem::path& path, std::size_t place,
                          std::size_t component, const ReadOptions& options) {
-  return vdb::readVectors(path, [&](vdb::InputFile& file) {
-    return vdb::readOpenVdbComponent(file, place, component, vdb::currently(path, options));
+  return vdb::readingFrom(path, [&](vdb::InputFile& file) {
+    return vdb::formatOf(file) == vdb::FileFormat::kOpenVdb
+               ? vdb::readOpenVdbComponent(file, place, component, vdb::currently(path, options))
+               : vdb::readNanoVdbComponent(file, place, component, options);
   });
 }
 
@@ -167,8 +163,10 @@ VolumeGrid readComponent(const std::filesystem::path& path, const std::string& n
 
 VectorGrid readVector(const std::filesystem::path& path, std::size_t place,
                       const ReadOptions& options) {
-  return vdb::readVectors(path, [&](vdb::InputFile& file) {
-    return vdb::readOpenVdbVector(file, place, vdb::currently(path, options));
+  return vdb::readingFrom(path, [&](vdb::InputFile& file) {
+    return vdb::formatOf(file) == vdb::FileFormat::kOpenVdb
+               ? vdb::readOpenVdbVector(file, place, vdb::currently(path, options))
+               : vdb::readNanoVdbVector(file, place, options);
   });
 }
 

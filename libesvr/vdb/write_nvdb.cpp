@@ -6,6 +6,8 @@
 #include <new>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
+#include <variant>
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -36,7 +38,7 @@ NanoHandle converted(const Grid& grid, float tolerance) {
 }
 #endif
 
-NanoHandle makeNano(const openvdb::FloatGrid& grid, const NanoForm& form) {
+NanoHandle floatsToNano(const openvdb::FloatGrid& grid, const NanoForm& form) {
   switch (form.values) {
     case NanoValues::kFloat:
       return converted<float>(grid, form.tolerance);
@@ -49,7 +51,7 @@ NanoHandle makeNano(const openvdb::FloatGrid& grid, const NanoForm& form) {
     case NanoValues::kFpN:
       return converted<nanovdb::FpN>(grid, form.tolerance);
   }
-  throw std::logic_error("makeNano: no such values");
+  throw std::logic_error("floatsToNano: no such values");
 }
 
 // Grids for renderers
@@ -88,66 +90,104 @@ Box leavesOf(const SparseVolume& volume) {
 
 // Files
 
-void refuseWhatNanoVdbLacks(const VolumeGrid& grid, const WriteOptions& options) {
-  const std::string name = "grid \"" + shownName(grid.descriptor.name) + "\": ";
-  if (options.half == HalfMode::kOn)
-    throw UsageError(name + ".nvdb files are not written as half; ask for .vdb");
-  if (!grid.descriptor.transform.affine)
-    throw UsageError(name + "a .nvdb holds affine transforms only, this one is a " +
-                     grid.descriptor.transform.mapType + "; ask for .vdb");
+/// A grid in the form from which OpenVDB's grid is made.
+using Readable = std::variant<const VolumeGrid*, const VectorGrid*>;
+
+std::string whyNotNano(const GridDescriptor& grid) {
+  if (grid.transform.affine) return "";
+  return "a .nvdb file holds affine transforms only, this one is a " + grid.transform.mapType;
 }
 
-VolumeGrid unpackedGrid(const PackedGrid& grid) {
-  const auto* voxels = std::get_if<PackedVoxels<float>>(&grid.voxels);
-  if (!voxels)
-    throw UsageError("grid \"" + shownName(grid.descriptor.name) + "\" has values of type " +
-                     valueTypeOf(grid) + ", which are not written to .nvdb files; ask for .vdb");
-  VolumeGrid volume{grid.descriptor, unpacked(*voxels)};
-  volume.descriptor.background = double(voxels->background);
-  return volume;
+std::string whyNotNano(const VolumeGrid& grid) { return whyNotNano(grid.descriptor); }
+std::string whyNotNano(const VectorGrid& grid) { return whyNotNano(grid.descriptor); }
+
+std::string whyNotNano(const CarriedGrid& carried) {
+  const GridSummary grid = inspectCarried(carried);
+  if ((grid.isScalar || grid.isVector) && grid.activeVoxels > 0) return "";
+  return "a .nvdb file cannot hold it (" + shownName(carried.treeType) + ", carried unchanged)";
 }
 
-/// \param unpackedGrids  gets the volumes of packed grids
-std::vector<const VolumeGrid*> volumesOf(std::span<const GridToWrite> grids,
-                                         std::deque<VolumeGrid>& unpackedGrids) {
-  std::vector<const VolumeGrid*> volumes;
-  for (const auto& grid : grids) {
-    if (const auto* carried = std::get_if<const CarriedGrid*>(&grid))
-      throw UsageError("grid \"" + shownName((*carried)->name) + "\" (" +
-                       shownName((*carried)->treeType) +
-                       ") is carried unchanged, which a .nvdb file cannot hold; ask for .vdb");
-    if (const auto* vectors = std::get_if<const VectorGrid*>(&grid))
-      throw UsageError("grid \"" + shownName((*vectors)->descriptor.name) +
-                       "\" has vectors, which are not written to .nvdb files; ask for .vdb");
-    if (const auto* packed = std::get_if<const PackedGrid*>(&grid))
-      volumes.push_back(&unpackedGrids.emplace_back(unpackedGrid(**packed)));
-    else
-      volumes.push_back(std::get<const VolumeGrid*>(grid));
+std::string whyNotNano(const PackedGrid& grid) {
+  const bool isReadable = std::holds_alternative<PackedVoxels<float>>(grid.voxels);
+  if (isReadable) return whyNotNano(grid.descriptor);
+  return "its values are of type " + valueTypeOf(grid) + ", which are not written to .nvdb files";
+}
+
+/// Grids that become others before they are written.
+class ReadGrids {
+ public:
+  Readable read(const GridToWrite& grid) {
+    return std::visit([&](const auto* one) { return of(*one); }, grid);
   }
-  return volumes;
+
+ private:
+  static Readable of(const VolumeGrid& grid) { return &grid; }
+  /// NanoVDB's converter has no vectors of doubles. The components are floats in any case.
+  Readable of(const VectorGrid& grid) {
+    if (grid.descriptor.valueType != ValueType::kDouble) return &grid;
+    VectorGrid& floats = vectors_.emplace_back(grid);
+    floats.descriptor.valueType = ValueType::kFloat;
+    return &floats;
+  }
+  Readable of(const PackedGrid& grid) {
+    const auto& voxels = std::get<PackedVoxels<float>>(grid.voxels);
+    VolumeGrid volume{grid.descriptor, unpacked(voxels)};
+    volume.descriptor.background = double(voxels.background);
+    return &volumes_.emplace_back(std::move(volume));
+  }
+  Readable of(const CarriedGrid& grid) {
+    if (inspectCarried(grid).isVector) return of(vectors_.emplace_back(readVector(grid)));
+    return &volumes_.emplace_back(readGrid(grid));
+  }
+
+  std::deque<VolumeGrid> volumes_;
+  std::deque<VectorGrid> vectors_;
+};
+
+NanoHandle toNano(const Readable& grid, const WriteOptions& options) {
+  const auto* const* vectors = std::get_if<const VectorGrid*>(&grid);
+  if (vectors) return makeNano(*makeOpenVdbGrid(**vectors, options, LeafVoxels::kInMemory));
+  return makeNano(*makeOpenVdbGrid(*std::get<const VolumeGrid*>(grid), options));
+}
+
+std::string nameOf(const CarriedGrid& grid) { return grid.name; }
+template <class Grid>
+std::string nameOf(const Grid& grid) {
+  return grid.descriptor.name;
+}
+
+void requireNano(const GridToWrite& grid, const WriteOptions& options) {
+  std::string why = esvr::whyNotNano(grid);
+  if (why.empty() && options.half == HalfMode::kOn) why = ".nvdb files are not written as half";
+  const auto name = std::visit([](const auto* one) { return nameOf(*one); }, grid);
+  if (!why.empty()) throw UsageError("grid \"" + shownName(name) + "\": " + why + "; ask for .vdb");
 }
 
 }  // namespace
 
 NanoHandle makeNano(const openvdb::GridBase& grid, const NanoForm& form) {
   if (grid.isType<openvdb::FloatGrid>())
-    return makeNano(static_cast<const openvdb::FloatGrid&>(grid), form);
-  if (grid.isType<openvdb::DoubleGrid>() && form.values == NanoValues::kFloat)
-    return converted<double>(static_cast<const openvdb::DoubleGrid&>(grid), form.tolerance);
+    return floatsToNano(static_cast<const openvdb::FloatGrid&>(grid), form);
+  if (form.values == NanoValues::kFloat) {
+    if (grid.isType<openvdb::DoubleGrid>())
+      return converted<double>(static_cast<const openvdb::DoubleGrid&>(grid), form.tolerance);
+    if (grid.isType<openvdb::Vec3SGrid>())
+      return converted<nanovdb::Vec3f>(static_cast<const openvdb::Vec3SGrid&>(grid), 0.0f);
+  }
   throw std::logic_error("makeNano: a grid of " + grid.valueType());
 }
 
 void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite> grids,
                   const WriteOptions& options) {
   if (grids.empty()) throw BadInput("a .nvdb file cannot be written without a grid; ask for .vdb");
-  std::deque<VolumeGrid> unpackedGrids;
-  const auto volumes = volumesOf(grids, unpackedGrids);
-  for (const VolumeGrid* grid : volumes) refuseWhatNanoVdbLacks(*grid, options);
+  for (const GridToWrite& grid : grids) requireNano(grid, options);
   WriteOptions whole = options;
   whole.half = HalfMode::kOff;
   std::vector<NanoHandle> handles;
-  for (const VolumeGrid* grid : volumes)
-    handles.push_back(makeNano(*makeOpenVdbGrid(*grid, whole)));
+  for (const GridToWrite& grid : grids) {
+    ReadGrids made;
+    handles.push_back(toNano(made.read(grid), whole));
+  }
 
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
@@ -158,6 +198,10 @@ void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite
 }  // namespace esvr::vdb
 
 namespace esvr {
+
+std::string whyNotNano(const GridToWrite& grid) {
+  return std::visit([](const auto* one) { return vdb::whyNotNano(*one); }, grid);
+}
 
 NanoVolume makeNanoVolume(const VolumeGrid& grid, NanoValues values) {
   vdb::initializeOpenVdb();

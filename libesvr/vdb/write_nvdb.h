@@ -52,8 +52,8 @@ struct NanoForm {
   float tolerance = -1.0f;  ///< for kFpN: largest error in value units; below 0: NanoVDB chooses it
 };
 
-/// Converts a grid of floats to a form, or a grid of doubles to doubles, without dithering.
-/// \throws std::logic_error  the grid has another type, or is one of doubles and the form is not
+/// Converts a grid of floats to a form, or one of doubles or of vectors of floats to the same type, without dithering.
+/// \throws std::logic_error  the grid has another type, or is not one of floats and the form is not
 ///                           kFloat
 [[nodiscard]] NanoHandle makeNano(const openvdb::GridBase& grid, const NanoForm& form = {});
 

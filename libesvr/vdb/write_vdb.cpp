@@ -218,6 +218,19 @@ class StreamedGrid : public openvdb::Grid<Tree> {
 
 // Grids
 
+/// A grid that holds the voxels of all bricks with active ones.
+/// \tparam Voxels  as of StreamedGrid
+template <class Tree, class Voxels>
+typename openvdb::Grid<Tree>::Ptr gridInMemory(const Voxels& voxels,
+                                               const typename Tree::ValueType& background) {
+  auto grid = openvdb::Grid<Tree>::create(background);
+  openvdb::tree::ValueAccessor<Tree> accessor(grid->tree());
+  for (std::size_t b = 0; b < voxels.count(); ++b)
+    if (voxels.active(b).count() > 0)
+      accessor.addLeaf(makeLeaf<typename Tree::LeafNodeType>(voxels, b, background).release());
+  return grid;
+}
+
 template <class Tree>
 GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, LeafVoxels voxels) {
   const auto background = typename Tree::ValueType(source.descriptor.background);
@@ -227,13 +240,8 @@ GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, Le
     return std::make_shared<StreamedGrid<Tree, NumberVoxels>>(NumberVoxels{source.volume},
                                                               background, options.constantTiles);
   const SparseVolume& volume = source.volume;
-  auto grid = openvdb::Grid<Tree>::create(background);
+  const auto grid = gridInMemory<Tree>(NumberVoxels{volume}, background);
   Tree& tree = grid->tree();
-  openvdb::tree::ValueAccessor<Tree> accessor(tree);
-  for (std::size_t b = 0; b < volume.brickCount(); ++b)
-    if (volume.active[b].count() > 0)
-      accessor.addLeaf(
-          makeLeaf<typename Tree::LeafNodeType>(NumberVoxels{volume}, b, background).release());
   // The flood fill overwrites active tiles, so it runs before there are any.
   if (levelSet && background > 0 && EmptySigns(volume).agree())
     openvdb::tools::signedFloodFill(tree);
@@ -245,9 +253,12 @@ GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, Le
 }
 
 template <class Tree>
-GridBase::Ptr makeVectors(const VectorGrid& source, const WriteOptions& options) {
+GridBase::Ptr makeVectors(const VectorGrid& source, const WriteOptions& options,
+                          LeafVoxels voxels) {
   using Vector = typename Tree::ValueType;
   const openvdb::Vec3d background(source.background.data());
+  if (voxels == LeafVoxels::kInMemory)
+    return gridInMemory<Tree>(VectorVoxels{aligned(source.components)}, Vector(background));
   return std::make_shared<StreamedGrid<Tree, VectorVoxels>>(
       VectorVoxels{aligned(source.components)}, Vector(background), options.constantTiles);
 }
@@ -449,11 +460,12 @@ GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& source, const WriteOptions& opti
   return grid;
 }
 
-GridBase::Ptr makeOpenVdbGrid(const VectorGrid& source, const WriteOptions& options) {
+GridBase::Ptr makeOpenVdbGrid(const VectorGrid& source, const WriteOptions& options,
+                              LeafVoxels voxels) {
   initializeOpenVdb();
   GridBase::Ptr grid = source.descriptor.valueType == ValueType::kDouble
-                           ? makeVectors<openvdb::Vec3DTree>(source, options)
-                           : makeVectors<openvdb::Vec3STree>(source, options);
+                           ? makeVectors<openvdb::Vec3DTree>(source, options, voxels)
+                           : makeVectors<openvdb::Vec3STree>(source, options, voxels);
   restoreDescriptor(source.descriptor, *grid);
   const auto all = [&](const auto& test) {
     bool passed = true;

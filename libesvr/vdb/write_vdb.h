@@ -24,10 +24,10 @@ enum class LeafVoxels {
 openvdb::GridBase::Ptr makeOpenVdbGrid(const VolumeGrid& grid, const WriteOptions& options,
                                        LeafVoxels voxels = LeafVoxels::kInMemory);
 
-/// A grid of the vectors: of type vec3d if the source was double, else vec3s. Its leaves get their
-/// voxels when it is written.
+/// A grid of the vectors: of type vec3d if the source was double, else vec3s. In memory, it has no tiles.
 /// \throws UsageError  as for a grid of numbers
-openvdb::GridBase::Ptr makeOpenVdbGrid(const VectorGrid& grid, const WriteOptions& options);
+openvdb::GridBase::Ptr makeOpenVdbGrid(const VectorGrid& grid, const WriteOptions& options,
+                                       LeafVoxels voxels = LeafVoxels::kWhenWritten);
 
 /// A grid of the type of the voxels. Its leaves get their voxels when it is written.
 /// \param grid  must outlive the result

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <utility>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "generators/paper_volumes.h"
 #include "generators/shapes.h"
@@ -104,11 +105,14 @@ std::span<const SampleKind> sampleKinds() { return kKinds; }
 
 const SampleKind& sampleKind(const std::string& name) {
   std::string known;
+  std::vector<std::string> names;
   for (const SampleKind& kind : kKinds) {
     if (name == kind.name) return kind;
     known += (known.empty() ? "" : ", ") + std::string(kind.name);
+    names.emplace_back(kind.name);
   }
-  throw UsageError("unknown sample '" + name + "'; the samples are " + known);
+  throw UsageError("unknown sample '" + name + "'; the samples are " + known +
+                   didYouMean(name, names));
 }
 
 }  // namespace esvr::samples

@@ -142,7 +142,7 @@ TEST_F(CarriedFile, SaysWhichGridsNanoVdbAndPartsCannotHold) {
   convert();
   const auto nano = test::esvr2vdb({out(), at("back.nvdb")});
   EXPECT_EQ(nano.exitCode, 0) << nano.err;
-  EXPECT_THAT(nano.err, AllOf(HasSubstr("grid \"vec3s\" is left out: a NanoVDB file"),
+  EXPECT_THAT(nano.err, AllOf(HasSubstr("grid \"vec3s\" is left out: a .nvdb file"),
                               Not(HasSubstr("density[0]"))));
   const auto part = test::esvr2vdb({out(), back(), "--bbox", "0,0,0,7,7,7"});
   EXPECT_EQ(part.exitCode, 0) << part.err;

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "cli/compare_fixture.h"
 #include "cli/converters.h"
@@ -69,6 +70,19 @@ class CompareCheck : public test::FolderTest {
 TEST_F(CompareCheck, refusesWhatTakesMoreMemoryThanAllowed) {
   write("drifted.vdb", {drifted()});
   EXPECT_EQ(check("drifted.vdb", {"-g", "density", "--max-memory", "100B"}).exitCode, 5);
+}
+
+TEST_F(CompareCheck, printsATableOfAHundredColumns) {
+  InputGrid longer = heat();
+  longer.name =
+      "temperature_of_the_combustion_products_in_kelvin_after_the_second_pass_of_the_solver";
+  write("ref.vdb", {ball(), longer});
+  write("off.vdb", {drifted(), longer});
+  const auto run = check("off.vdb", {"--ssim", "--max-relative-error", "50%"});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  std::istringstream lines(run.out);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 100u) << line;
+  EXPECT_THAT(run.out, AllOf(HasSubstr('\n' + longer.name + '\n'), HasSubstr("\ndensity  ")));
 }
 
 TEST_F(CompareCheck, findsNoErrorInTheFileItself) {
@@ -389,7 +403,8 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(CompareProgram, namesItsCommands) {
   const auto run = test::runProgram(ESVR_COMPARE, {"chekc", "a", "b"});
   EXPECT_EQ(run.exitCode, 2);
-  EXPECT_THAT(run.err, HasSubstr("unknown command 'chekc'; the commands are check"));
+  EXPECT_THAT(run.err, HasSubstr("unknown command 'chekc'; the commands are check, table "
+                                 "and curves; did you mean check?"));
   EXPECT_EQ(test::runProgram(ESVR_COMPARE, {}).exitCode, 2);
   EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"--help"}).exitCode, 0);
   EXPECT_THAT(test::runProgram(ESVR_COMPARE, {"check", "--help"}).out, HasSubstr("--min-psnr"));

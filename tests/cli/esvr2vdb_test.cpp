@@ -16,6 +16,9 @@
 #include "esvr/container.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
+#include "vdb/open_vdb.h"
+
+#include <openvdb/io/File.h>
 
 namespace esvr {
 namespace {
@@ -175,6 +178,59 @@ TEST_F(Esvr2Vdb, listsTheGridsOfAVdb) {
   EXPECT_THAT(details.out, HasSubstr(std::to_string(grids[0].activeVoxels)));
   EXPECT_GT(grids[0].storedBytes, 100u);
   EXPECT_LT(grids[0].storedBytes + grids[1].storedBytes, std::filesystem::file_size(source()));
+}
+
+TEST_F(Esvr2Vdb, saysWhichGridOrValueAMistypedOneMayBe) {
+  EXPECT_THAT(esvr2vdb({in(), out(), "-g", "densty"}).err,
+              HasSubstr("\"density\", \"heat\"; did you mean \"density\"?"));
+  EXPECT_THAT(esvr2vdb({in(), out(), "-g", "velocity"}).err, Not(HasSubstr("did you mean")));
+  EXPECT_THAT(esvr2vdb({in(), out(), "--half", "of"}).err, HasSubstr("; did you mean off?"));
+}
+
+openvdb::FloatGrid::Ptr gridWithUnits(const std::string& name) {
+  auto grid = openvdb::FloatGrid::create();
+  grid->setName(name);
+  for (int x = 0; x < 20; ++x) grid->tree().setValue({x, 0, 0}, float(x));
+  grid->insertMeta("length_unit", openvdb::StringMetadata("mm"));
+  grid->insertMeta("timeUnits", openvdb::FloatMetadata(0.5f));
+  grid->insertMeta("community", openvdb::StringMetadata("none"));
+  return grid;
+}
+
+TEST_F(Esvr2Vdb, listsWhoMadeAFileItsFrameRateAndItsUnits) {
+  openvdb::initialize();
+  openvdb::MetaMap metadata;
+  metadata.insertMeta("creator", openvdb::StringMetadata("a\nprogram"));
+  metadata.insertMeta("Frame_Rate", openvdb::DoubleMetadata(23.976));
+  metadata.insertMeta("note", openvdb::StringMetadata("of no interest"));
+  const auto plain = openvdb::FloatGrid::create();
+  plain->setName("plain");
+  plain->tree().setValue({0, 0, 0}, 1.0f);
+  const std::string vdb = folder_ / "units.vdb", esvr = folder_ / "units.esvr";
+  openvdb::io::File(vdb).write({gridWithUnits("ct"), plain, gridWithUnits("dose")}, metadata);
+  ASSERT_EQ(test::vdb2esvr({vdb, esvr, "--lossless", "--keep", "dose"}).exitCode, 0);
+  for (const std::string& file : {vdb, esvr}) {
+    const auto run = esvr2vdb({"--list", file});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    EXPECT_THAT(run.out, AllOf(HasSubstr(" bytes\nFrame_Rate 23.98, creator a?program\n\n"),
+                               HasSubstr("\nct, dose: length_unit mm, timeUnits 0.5\n"),
+                               Not(HasSubstr("plain:")), Not(HasSubstr("none"))))
+        << file;
+  }
+}
+
+TEST_F(Esvr2Vdb, listsTheFrameRateOfASequence) {
+  openvdb::initialize();
+  openvdb::MetaMap metadata;
+  metadata.insertMeta("fps", openvdb::Int32Metadata(24));
+  for (const int frame : {1, 2})
+    openvdb::io::File(folder_ / ("f." + std::to_string(frame) + ".vdb"))
+        .write({gridWithUnits("ct")}, metadata);
+  const std::string pattern = folder_ / "f.@.vdb", file = folder_ / "f.esvr";
+  ASSERT_EQ(test::vdb2esvr({pattern, file, "--lossless"}).exitCode, 0);
+  EXPECT_THAT(esvr2vdb({"--list", pattern}).out, HasSubstr(" a file each\nfps 24\n\n"));
+  EXPECT_THAT(esvr2vdb({"--list", file}).out,
+              AllOf(HasSubstr(" groups\nfps 24\n\n"), HasSubstr("\nct: length_unit mm")));
 }
 
 TEST_F(Esvr2Vdb, saysThatNanoVdbHoldsNoMetadata) {

@@ -110,6 +110,14 @@ TEST_P(EveryProgram, takesANumberOfThreads) {
   EXPECT_THAT(none.err, HasSubstr("threads"));
 }
 
+TEST_P(EveryProgram, saysWhichOptionAMistypedOneMayBe) {
+  auto arguments = job();
+  arguments.insert(arguments.end(), {"--thraeds", "1"});
+  const auto typed = test::runProgram(GetParam().path, arguments);
+  EXPECT_EQ(typed.exitCode, 2);
+  EXPECT_THAT(typed.err, AllOf(HasSubstr("--thraeds"), HasSubstr("; did you mean --threads?\n")));
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, EveryProgram,
     testing::Values(ProgramCommand{"vdb2esvr",

@@ -48,6 +48,17 @@ double massOf(const std::string& path) {
   return sum * m[0] * m[5] * m[10];
 }
 
+TEST_F(SplatFiles, AreListed) {
+  ASSERT_EQ(exportTo("out.ply", {"--colors", "0.8,0.4,0.2"}).exitCode, 0);
+  const auto run = esvr2vdb({"--list", at("out.ply")});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const auto count = std::to_string(readSplats(at("out.ply")).inFile);
+  EXPECT_THAT(run.out, testing::AllOf(HasSubstr("out.ply: splats, "), HasSubstr('\n' + count),
+                                      HasSubstr("of degree 0"), HasSubstr("known")));
+  test::writeText(at("bad.ply"), "ply\n");
+  EXPECT_EQ(esvr2vdb({"--list", at("bad.ply")}).exitCode, 3);
+}
+
 TEST_F(SplatFiles, ComeBackAsADensityInItsPlace) {
   const auto out = exportTo("out.ply", {"--colors", "0.8,0.4,0.2"});
   ASSERT_EQ(out.exitCode, 0) << out.err;

@@ -123,9 +123,88 @@ TEST_F(Nvdb, ListsSeveralGridsAndWhyOneIsSkipped) {
   ASSERT_EQ(grids.size(), 4u);
   EXPECT_EQ(grids[1].uniqueName, "density[1]");
   EXPECT_THAT(grids[2].skipReason, HasSubstr("no active voxel"));
-  EXPECT_THAT(grids[3].skipReason, HasSubstr("vec3s"));
+  EXPECT_THAT(grids[3].skipReason, HasSubstr("no active voxel"));
+  EXPECT_FALSE(grids[3].isVector);
   EXPECT_EQ(valueAt(readGrid(path(), "density[1]").volume, {0, 0, 0}), 2.0f);
   EXPECT_THROW((void)readGrid(path(), "vel"), BadInput);
+}
+
+/// Vectors in leaves and tiles of two levels, with a background that is not zero.
+openvdb::Vec3SGrid::Ptr sourceOfVectors() {
+  openvdb::initialize();
+  auto grid = openvdb::Vec3SGrid::create({0.5f, 0.0f, -1.0f});
+  grid->setName("vel");
+  grid->setGridClass(openvdb::GRID_STAGGERED);
+  for (int i = 0; i < 300; ++i)
+    grid->tree().setValue({i % 20 - 10, i / 20, i % 7}, {float(i), 0.25f * float(i % 3), -1.0f});
+  grid->tree().addTile(1, {64, 0, 0}, {0.75f, 1.0f, 2.0f}, true);
+  grid->tree().addTile(2, {1024, 0, 0}, {2.0f, 3.0f, 4.0f}, true);
+  grid->setTransform(openvdb::math::Transform::createLinearTransform(0.1));
+  return grid;
+}
+
+void expectSameVectors(const VectorGrid& actual, const VectorGrid& expected) {
+  EXPECT_EQ(actual.background, expected.background);
+  EXPECT_EQ(actual.descriptor.name, expected.descriptor.name);
+  EXPECT_EQ(actual.descriptor.gridClass, expected.descriptor.gridClass);
+  EXPECT_EQ(actual.descriptor.transform, expected.descriptor.transform);
+  for (std::size_t c = 0; c < kComponents; ++c)
+    test::expectSameBits(actual.components[c], expected.components[c]);
+}
+
+TEST_F(Nvdb, OfVectorsReadsAsItsSource) {
+  const auto source = sourceOfVectors();
+  test::save(directory_ / "in.vdb", {source});
+  const VectorGrid expected = readVector(directory_ / "in.vdb", "vel");
+  save({test::smallGrid(), source}, NanoCodec::kBlosc);
+  const GridSummary listed = inspectVdb(path()).grids[1];
+  EXPECT_TRUE(listed.isVector);
+  EXPECT_THAT(listed.skipReason, HasSubstr("vectors (vec3s)"));
+  expectSameVectors(readVector(path(), "vel"), expected);
+  const VolumeGrid y = readGrid(path(), "vel.y");
+  EXPECT_EQ(y.descriptor.name, "vel.y");
+  test::expectSameBits(y.volume, expected.components[1]);
+  EXPECT_THROW((void)readGrid(path(), "vel"), BadInput);
+  EXPECT_THROW((void)readVector(path(), "density"), BadInput);
+  EXPECT_EQ(valueTypeOf(readPacked(path(), "vel")), "vec3s");
+}
+
+TEST_F(Nvdb, OfVectorsIsWhatNanoVdbReads) {
+  test::save(directory_ / "in.vdb", {sourceOfVectors()});
+  VectorGrid grid = readVector(directory_ / "in.vdb", "vel");
+  const auto carried = readCarried(directory_ / "in.vdb", std::vector<std::size_t>{0});
+  for (const bool isDouble : {false, true}) {
+    grid.descriptor.valueType = isDouble ? ValueType::kDouble : ValueType::kFloat;
+    const std::vector<GridToWrite> all{&grid, &carried.front()};
+    writeGrids(path(), {}, all, {.overwrite = true});
+    const auto handles = nanovdb::io::readGrids(path().string());
+    ASSERT_EQ(handles.size(), 2u);
+    for (const auto& handle : handles) {
+      const auto* back = handle.grid<nanovdb::Vec3f>();
+      ASSERT_TRUE(back);
+      EXPECT_EQ(back->activeVoxelCount(), activeVoxelCount(grid.components[0]));
+      EXPECT_EQ(back->gridClass(), nanovdb::GridClass::Staggered);
+      EXPECT_EQ(back->tree().background(), nanovdb::Vec3f(0.5f, 0.0f, -1.0f));
+      const auto accessor = back->getAccessor();
+      for (int i = 0; i < 300; ++i) {
+        const Coord at{i % 20 - 10, i / 20, i % 7};
+        for (std::size_t c = 0; c < kComponents; ++c)
+          ASSERT_EQ(accessor.getValue({at.x, at.y, at.z})[int(c)], valueAt(grid.components[c], at));
+      }
+      EXPECT_EQ(accessor.getValue({1024, 5, 5}), nanovdb::Vec3f(2.0f, 3.0f, 4.0f));
+    }
+    expectSameVectors(readVector(path(), "vel[1]"), readVector(directory_ / "in.vdb", "vel"));
+  }
+}
+
+TEST_F(Nvdb, CannotHoldWhatIsNeitherNumbersNorVectors) {
+  test::save(directory_ / "in.vdb", {test::emptyGrid("Tree_int32_5_4_3", "id")});
+  const auto carried = readCarried(directory_ / "in.vdb", std::vector<std::size_t>{0});
+  EXPECT_THAT(whyNotNano(&carried.front()), HasSubstr("int32"));
+  VolumeGrid sheared = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
+  EXPECT_EQ(whyNotNano(&sheared), "");
+  sheared.descriptor.transform.affine.reset();
+  EXPECT_THAT(whyNotNano(&sheared), HasSubstr("affine"));
 }
 
 TEST_F(Nvdb, WithNonFiniteVoxelsIsRefusedOrMended) {

@@ -664,14 +664,6 @@ TEST_F(OtherVectors, BeyondHalfAreNotWrittenAsHalf) {
               ThrowsMessage<UsageError>(HasSubstr("65504")));
 }
 
-TEST_F(OtherVectors, AreNotWrittenToNanoVdb) {
-  test::save(path("in.vdb"), {windGrid<Vec3SGrid>()});
-  const VectorGrid wind = readVector(path("in.vdb"), "wind");
-  const std::vector<GridToWrite> grids{&wind};
-  EXPECT_THAT([&] { writeGrids(path("out.nvdb"), {}, grids); },
-              ThrowsMessage<UsageError>(AllOf(HasSubstr("wind"), HasSubstr("vectors"))));
-}
-
 TEST_F(OtherVectors, OfMoreMemoryThanAllowedAreRefused) {
   test::save(path("in.vdb"), {windGrid<Vec3SGrid>()});
   constexpr std::uint64_t kTwoComponents = 20'000;  // three bricks take 6 KB in each

@@ -7,6 +7,7 @@
 #include <span>
 #include <variant>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -45,7 +46,8 @@ Grid gridNamed(const File& self, const std::string& name) {
     const GridNames all(namesInOrder(*self.file));
     if (all.isAmbiguous(name) || all.lookUp(name))
       throw py::key_error("the file " + std::string(error.what()));
-    throw py::key_error("there is no grid '" + shownName(name) + "'; there are: " + listed(self));
+    throw py::key_error("there is no grid '" + shownName(name) + "'; there are: " + listed(self) +
+                        didYouMean(name, all.allUnique(), "'"));
   }
 }
 
@@ -53,11 +55,6 @@ std::vector<std::string> carriedNames(const File& self) {
   std::vector<std::string> names;
   for (const auto& grid : self.file->carried) names.push_back(grid.name);
   return names;
-}
-
-std::string fileText(const File& self) {
-  const std::string names = listed(self);
-  return "<esvr.File: " + (names.empty() ? "no grid" : names) + ">";
 }
 
 }  // namespace
@@ -116,9 +113,11 @@ std::vector<std::int64_t> framesOf(const std::filesystem::path& path) {
 
 /// A reader that threads of Python may share.
 struct Sequence {
-  Sequence(const std::filesystem::path& path, std::uint64_t maxBytes)
-      : reader(path, {.maxBytes = maxBytes}) {}
+  Sequence(const std::filesystem::path& file, std::uint64_t limit)
+      : path(file), maxBytes(limit), reader(path, {.maxBytes = maxBytes}) {}
 
+  std::filesystem::path path;
+  std::uint64_t maxBytes;
   SequenceReader reader;
   std::mutex reads;
 };
@@ -271,8 +270,9 @@ void addFiles(py::module_& module) {
           "box ((x0, y0, z0), (x1, y1, z1)), layers and max_ellipsoids are --bbox, --lod and\n"
           "--max-ellipsoids of esvr2vdb. With one of them, carried grids are left out, because\n"
           "they cannot be cut. Returns the names of the grids that were left out.")
-      .def("__len__", [](const File& f) { return f.file->grids.size(); })
-      .def("__repr__", &fileText);
+      .def(
+          "__len__", [](const File& f) { return f.file->grids.size(); }, "The number of grids.")
+      .def("__repr__", [](const File& f) { return describe(f); });
   py::class_<Sequence>(
       module, "Sequence",
       "A file that holds a sequence. Reading its frames in their order decodes each\n"
@@ -287,7 +287,19 @@ void addFiles(py::module_& module) {
       .def_property_readonly(
           "frames", [](const Sequence& s) { return numbersOf(s.reader); },
           "The numbers of the frames, which increase.")
-      .def("read", &readOfSequence, py::arg("frame"), "Reads a frame (esvr.File).");
+      .def("read", &readOfSequence, py::arg("frame"), "Reads a frame (esvr.File).")
+      .def("__reduce__",
+           [](const Sequence& s) {
+             const py::object opened = py::module_::import("functools")
+                                           .attr("partial")(py::type::of<Sequence>(), s.path,
+                                                            py::arg("max_memory") = s.maxBytes);
+             return py::make_tuple(opened, py::tuple());
+           })
+      .def("__repr__", [](const Sequence& s) {
+        return "<esvr.Sequence '" + shownText(s.path.string(), LineEnds::kReplace) +
+               "': " + std::to_string(s.reader.frames().size()) + " frames, " +
+               std::to_string(s.reader.fileBytes()) + " bytes>";
+      });
   module.def(
       "read", &read, py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
       py::arg("ellipsoids") = py::none(), py::arg("frame") = py::none(),

@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "esvr/convert_file.h"
+#include "esvr/did_you_mean.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -20,13 +21,6 @@
 
 namespace esvr::python {
 namespace {
-
-/// esvr.Ellipsoids: the ellipsoids of all chunks, as arrays.
-struct Ellipsoids {
-  py::array_t<double> mu;
-  py::array_t<float> scale, quaternion, intensity, kappa;
-  double epsilon = 0.0;  ///< the kernel's epsilon (ellipsoids.h)
-};
 
 /// Copies the ellipsoids of a chunk to row `first` and those after it.
 void copyChunk(const Chunk& chunk, float kappa, py::ssize_t first, Ellipsoids& to) {
@@ -102,14 +96,6 @@ std::string kindOf(const StoredGrid& grid) {
   return grid.residual ? "ellipsoids with a residual" : "ellipsoids";
 }
 
-std::string gridText(const Grid& self) {
-  const StoredGrid& grid = *self.grid;
-  const std::size_t ellipsoids = grid.field.ellipsoidCount();
-  std::string text = "<esvr.Grid '" + shownName(grid.descriptor.name) + "': ";
-  text += grid.voxels ? "voxels" : std::to_string(ellipsoids) + " ellipsoids";
-  return text + ", " + std::to_string(grid.activeVoxels) + " active voxels>";
-}
-
 void addEllipsoids(py::module_& module) {
   py::class_<Ellipsoids>(
       module, "Ellipsoids",
@@ -126,20 +112,15 @@ void addEllipsoids(py::module_& module) {
       .def_readonly("kappa", &Ellipsoids::kappa, "Edges of the kernel: float32 of shape (n,).")
       .def_readonly("epsilon", &Ellipsoids::epsilon,
                     "The kernel ends where (1 + E) / (E + e^m) falls to it, with E = e^kappa.")
-      .def("__len__", [](const Ellipsoids& e) { return e.intensity.size(); });
+      .def(
+          "__len__", [](const Ellipsoids& e) { return e.intensity.size(); },
+          "The number of ellipsoids.")
+      .def("__repr__", [](const Ellipsoids& e) {
+        return "<esvr.Ellipsoids: " + std::to_string(e.intensity.size()) + ">";
+      });
 }
 
 }  // namespace
-
-py::object matrixOf(const Transform& transform) {
-  if (!transform.affine) return py::none();
-  constexpr py::ssize_t kSide = 4;
-  py::array_t<double> matrix({kSide, kSide});
-  for (py::ssize_t row = 0; row < kSide; ++row)  // the library's matrix is for row vectors
-    for (py::ssize_t column = 0; column < kSide; ++column)
-      matrix.mutable_at(row, column) = (*transform.affine)[std::size_t(kSide * column + row)];
-  return matrix;
-}
 
 Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
                const std::optional<std::uint64_t>& maxMemory) {
@@ -166,15 +147,18 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "ellipsoid_count", [](const Grid& g) { return g.grid->field.ellipsoidCount(); },
           "Number of ellipsoids; 0 if the grid stores voxels.")
-      .def_property_readonly("name", [](const Grid& g) { return g.grid->descriptor.name; })
+      .def_property_readonly(
+          "name", [](const Grid& g) { return g.grid->descriptor.name; },
+          "The name of the grid, which other grids of its file may have, too.")
       .def_property_readonly(
           "grid_class", [](const Grid& g) { return className(g.grid->descriptor.gridClass); },
           "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
       .def_property_readonly(
           "kind", [](const Grid& g) { return kindOf(*g.grid); },
           "\"ellipsoids\", \"ellipsoids with a residual\" or \"voxels\".")
-      .def_property_readonly("background",
-                             [](const Grid& g) { return float(g.grid->descriptor.background); })
+      .def_property_readonly(
+          "background", [](const Grid& g) { return float(g.grid->descriptor.background); },
+          "The value where no voxel is active.")
       .def_property_readonly(
           "active_voxels", [](const Grid& g) { return g.grid->activeVoxels; },
           "Number of active voxels of the source.")
@@ -197,7 +181,7 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "bytes", [](const Grid& g) { return bytesAdded(*g.grid); },
           "Largest number of bytes that the grid adds to a file.")
-      .def("__repr__", &gridText);
+      .def("__repr__", [](const Grid& g) { return describe(g); });
 }
 
 // esvr.fit and esvr.convert.
@@ -213,11 +197,14 @@ struct Word {
 template <class Value, std::size_t n>
 Value valueOf(const char* argument, const std::string& text, const Word<Value> (&words)[n]) {
   std::string known;
+  std::vector<std::string> all;
   for (const auto& w : words) {
     if (text == w.word) return w.value;
     known += (known.empty() ? "" : ", ") + std::string(w.word);
+    all.emplace_back(w.word);
   }
-  throw UsageError(std::string(argument) + " is one of " + known + ", not '" + text + "'");
+  throw UsageError(std::string(argument) + " is one of " + known + ", not '" + text + "'" +
+                   didYouMean(text, all));
 }
 
 constexpr Word<Preset> kPresets[] = {

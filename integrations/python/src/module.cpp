@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "esvr/device.h"
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "python/src/objects.h"
@@ -120,8 +121,9 @@ void addCompare(py::module_& module) {
       .def_property_readonly("psnr_t10", &light<&TransmittancePsnr::psnr10>, "The same with 10 %.")
       .def_property_readonly("median_depth", &light<&TransmittancePsnr::medianDepth>,
                              "Sum of the values of the reference's median column.")
-      .def_readonly("mse_box", &M::mseBox)
-      .def_readonly("mse_active", &M::mseActive)
+      .def_readonly("mse_box", &M::mseBox, "Mean squared error over the box.")
+      .def_readonly("mse_active", &M::mseActive,
+                    "Mean squared error over the active voxels of the reference.")
       .def_readonly("max_error", &M::maxError, "Largest absolute error over the box.")
       .def_readonly("p999_error", &M::p999Error,
                     "99.9th percentile of the absolute error over the active voxels of both.")
@@ -151,6 +153,9 @@ PYBIND11_MODULE(_core, module) {
       "Sparse volumes as lists of ellipsoids. All coordinates are those of the index space: voxel\n"
       "(i, j, k) lies at (i, j, k), and arrays have the axes x, y, z.";
   module.attr("__version__") = ESVR_VERSION;
+  module.def("_did_you_mean", [](const std::string& given, const std::vector<std::string>& known) {
+    return esvr::didYouMean(given, known);
+  });
   addErrors(module);
   addVolume(module);
   addPacked(module);
@@ -160,4 +165,5 @@ PYBIND11_MODULE(_core, module) {
   addRender(module);
   addSplats(module);
   addCompare(module);
+  addPickling(module);
 }

@@ -29,6 +29,20 @@ struct Volume {
   std::uint64_t roundedValues = 0;  ///< active voxels whose number was rounded to a float
 };
 
+/// The voxels of a level set with the signs that say where its inside is.
+struct SignedVoxels {
+  explicit SignedVoxels(SparseVolume source) : volume(std::move(source)), signs(volume) {}
+
+  SparseVolume volume;
+  EmptySigns signs;
+};
+
+/// esvr.PackedGrid. It does not change after it was made.
+struct Packed {
+  std::shared_ptr<const PackedGrid> grid;
+  std::shared_ptr<const SignedVoxels> levelSet{};  ///< null for grids of other classes
+};
+
 /// esvr.File: the content of an .esvr file.
 struct File {
   std::shared_ptr<const EsvrFile> file;
@@ -44,6 +58,13 @@ struct Grid {
   return given ? *given : usualMemoryLimit();
 }
 
+/// esvr.Ellipsoids: the ellipsoids of all chunks, as arrays.
+struct Ellipsoids {
+  py::array_t<double> mu;
+  py::array_t<float> scale, quaternion, intensity, kappa;
+  double epsilon = 0.0;  ///< the kernel's epsilon (ellipsoids.h)
+};
+
 /// A box of voxels as Python has it: its first and its last voxel.
 using Corner = std::array<std::int32_t, 3>;
 using PlainBox = std::array<Corner, 2>;
@@ -55,6 +76,28 @@ using PlainBox = std::array<Corner, 2>;
   if (b.empty()) return std::nullopt;
   return PlainBox{{{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}}};
 }
+
+/// Metadata as a dictionary of Python, and the other way (properties.cpp). Items of types that Python has not are
+/// left out of the dictionary.
+[[nodiscard]] py::dict dictOf(const std::vector<MetaItem>& items);
+/// \throws UsageError  a value is of another type than those of OpenVDB's metadata
+[[nodiscard]] std::vector<MetaItem> itemsOf(const py::dict& metadata);
+
+/// A matrix from index to world coordinates, for column vectors; the library's is for row vectors.
+using Matrix = std::array<std::array<double, 4>, 4>;
+/// \throws UsageError  the matrix is singular
+[[nodiscard]] Transform transformFrom(const Matrix& matrix);
+/// \throws UsageError  no class has the name
+[[nodiscard]] GridClass classFrom(const std::string& name);
+
+/// What repr() says of an object, in one line (describe.cpp).
+[[nodiscard]] std::string describe(const Volume& volume);
+[[nodiscard]] std::string describe(const Grid& grid);
+[[nodiscard]] std::string describe(const Packed& grid);
+[[nodiscard]] std::string describe(const File& file);
+
+/// Bytes of memory that the voxels of a volume take.
+[[nodiscard]] std::uint64_t bytesInMemory(const SparseVolume& volume);
 
 /// The matrix from index to world coordinates, for column vectors; None for a frustum.
 [[nodiscard]] py::object matrixOf(const Transform& transform);
@@ -112,5 +155,7 @@ void addFiles(py::module_& module);
 void addFit(py::module_& module);
 void addRender(py::module_& module);
 void addSplats(py::module_& module);
+/// Lets the objects of the classes above be pickled and copied.
+void addPickling(py::module_& module);
 
 }  // namespace esvr::python

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 
+#include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
@@ -18,109 +19,6 @@
 
 namespace esvr::python {
 namespace {
-
-/// The voxels of a level set with the signs that say where its inside is.
-struct SignedVoxels {
-  explicit SignedVoxels(SparseVolume source) : volume(std::move(source)), signs(volume) {}
-
-  SparseVolume volume;
-  EmptySigns signs;
-};
-
-/// esvr.PackedGrid. It does not change after it was made.
-struct Packed {
-  std::shared_ptr<const PackedGrid> grid;
-  std::shared_ptr<const SignedVoxels> levelSet{};  ///< null for grids of other classes
-};
-
-// -- metadata and transforms ---------------------------------------------------------------------
-
-template <class T>
-MetaItem itemOf(const std::string& name, const char* type, const T& value) {
-  MetaItem item{name, type, std::vector<std::byte>(sizeof value)};
-  std::memcpy(item.value.data(), &value, sizeof value);
-  return item;
-}
-
-bool isInteger(const py::handle& value) { return PyIndex_Check(value.ptr()) != 0; }
-bool isFloat(const py::handle& value) { return py::isinstance<py::float_>(value); }
-
-/// True for a tuple of three objects of a kind.
-template <class Test>
-bool isTriple(const py::handle& value, const Test& test) {
-  if (!py::isinstance<py::tuple>(value) || py::len(value) != 3) return false;
-  for (const py::handle element : py::reinterpret_borrow<py::tuple>(value))
-    if (!test(element)) return false;
-  return true;
-}
-
-/// The items of a dictionary. OpenVDB has a type for each kind of value.
-std::vector<MetaItem> itemsOf(const py::dict& metadata) {
-  std::vector<MetaItem> items;
-  for (const auto& [key, value] : metadata) {
-    const auto name = key.cast<std::string>();
-    if (py::isinstance<py::bool_>(value))
-      items.push_back(itemOf(name, "bool", value.cast<bool>()));
-    else if (isInteger(value))
-      items.push_back(itemOf(name, "int64", value.cast<std::int64_t>()));
-    else if (py::isinstance<py::float_>(value))
-      items.push_back(itemOf(name, "double", value.cast<double>()));
-    else if (py::isinstance<py::str>(value))
-      items.push_back(stringItem(name, value.cast<std::string>()));
-    else if (isTriple(value, isInteger))
-      items.push_back(itemOf(name, "vec3i", value.cast<Corner>()));
-    else if (isTriple(value, isFloat))
-      items.push_back(itemOf(name, "vec3d", value.cast<std::array<double, 3>>()));
-    else
-      throw UsageError("the metadata item '" + name +
-                       "' must be a text, a number, a truth value, or a tuple of three integers or "
-                       "three floats");
-  }
-  return items;
-}
-
-template <class T>
-py::object valueAs(const MetaItem& item) {
-  T value{};
-  if (item.value.size() != sizeof value) return py::none();
-  std::memcpy(&value, item.value.data(), sizeof value);
-  return py::cast(value);
-}
-
-/// None for an item of a type that itemsOf does not make and that is no number.
-py::object objectOf(const MetaItem& item) {
-  const auto* const text = reinterpret_cast<const char*>(item.value.data());
-  if (item.type == "string")
-    return py::reinterpret_steal<py::object>(
-        PyUnicode_DecodeUTF8(text, py::ssize_t(item.value.size()), "replace"));
-  if (item.type == "bool")
-    return item.value.size() == 1 ? py::object(py::bool_(text[0] != 0)) : py::none();
-  if (item.type == "int32") return valueAs<std::int32_t>(item);
-  if (item.type == "int64") return valueAs<std::int64_t>(item);
-  if (item.type == "float") return valueAs<float>(item);
-  if (item.type == "double") return valueAs<double>(item);
-  if (item.type == "vec3i") return py::tuple(valueAs<Corner>(item));
-  if (item.type == "vec3d") return py::tuple(valueAs<std::array<double, 3>>(item));
-  return py::none();
-}
-
-py::dict dictOf(const std::vector<MetaItem>& items) {
-  py::dict metadata;
-  for (const MetaItem& item : items)
-    if (const py::object value = objectOf(item); !value.is_none())
-      metadata[py::str(item.name)] = value;
-  return metadata;
-}
-
-using Matrix = std::array<std::array<double, 4>, 4>;
-
-/// \param matrix  for column vectors; the library's is for row vectors
-Transform transformFrom(const Matrix& matrix) {
-  std::array<double, 16> rows{};
-  for (std::size_t row = 0; row < 4; ++row)
-    for (std::size_t column = 0; column < 4; ++column) rows[4 * column + row] = matrix[row][column];
-  return affineTransform(rows);
-}
 
 // -- making grids --------------------------------------------------------------------------------
 
@@ -249,13 +147,9 @@ std::unique_ptr<Builder> makeBuilder(const std::string& type, const py::object& 
     const PackedVector vector{float(number), float(number), float(number)};
     return std::make_unique<TypedBuilder<PackedVector, float>>(vector, rule);
   }
-  throw UsageError("type is one of float, double, int32, int64, bool, vec3s, not '" + type + "'");
-}
-
-GridClass classFrom(const std::string& name) {
-  for (const auto gridClass : {GridClass::kUnknown, GridClass::kFogVolume})
-    if (name == className(gridClass)) return gridClass;
-  throw UsageError("grid_class is 'fog volume' or 'unknown', not '" + name + "'");
+  const std::vector<std::string> known{"float", "double", "int32", "int64", "bool", "vec3s"};
+  throw UsageError("type is one of float, double, int32, int64, bool, vec3s, not '" + type + "'" +
+                   didYouMean(type, known));
 }
 
 Packed finishBuilder(Builder& builder) {
@@ -614,14 +508,17 @@ void addPackedGrid(py::module_& module) {
       .def("active", &activeOf, py::arg("box") = py::none(), py::kw_only(), py::arg("order") = "C",
            "Which voxels of a box are active: bool with the axes x, y, z.")
       .def("to_volume", &toVolume, "A volume with the voxels of a grid of floats.")
-      .def_property_readonly("name", [](const Packed& p) { return p.grid->descriptor.name; })
+      .def_property_readonly(
+          "name", [](const Packed& p) { return p.grid->descriptor.name; }, "The name of the grid.")
       .def_property_readonly(
           "value_type", [](const Packed& p) { return valueTypeOf(*p.grid); },
           "\"float\", \"double\", \"int32\", \"int64\", \"bool\" or \"vec3s\".")
       .def_property_readonly(
           "grid_class", [](const Packed& p) { return className(p.grid->descriptor.gridClass); },
           "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
-      .def_property_readonly("background", [](const Packed& p) { return backgroundOf(*p.grid); })
+      .def_property_readonly(
+          "background", [](const Packed& p) { return backgroundOf(*p.grid); },
+          "The value of voxels that are not active.")
       .def_property_readonly(
           "active_voxels", [](const Packed& p) { return activeVoxelCount(*p.grid); },
           "Number of active voxels.")
@@ -633,7 +530,8 @@ void addPackedGrid(py::module_& module) {
           "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
       .def_property_readonly(
           "metadata", [](const Packed& p) { return dictOf(p.grid->descriptor.metadata); },
-          "The grid's metadata that are texts, numbers, truth values or three numbers.");
+          "The grid's metadata that are texts, numbers, truth values or three numbers.")
+      .def("__repr__", [](const Packed& p) { return describe(p); });
 }
 
 }  // namespace

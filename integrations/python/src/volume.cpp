@@ -21,6 +21,7 @@ using FlagArray = py::array_t<bool, py::array::c_style | py::array::forcecast>;
 struct Dense {
   const float* values;
   const bool* masked;  ///< null: no element is masked
+  const bool* active;  ///< null: values say which voxels are active
   Coord side;
   Box box;
 
@@ -129,8 +130,8 @@ Numbers numbersOf(const py::object& given, const Corner& origin) {
   return numbers;
 }
 
-/// A voxel of the array is active if it is not masked and differs from the background by more than
-/// the threshold.
+/// A voxel of the array is active if it is not masked, and if the caller says so, or else if it differs from
+/// the background by more than the threshold.
 BrickInput brickOfArray(const Dense& dense, Coord corner, float background, float threshold) {
   BrickInput brick{corner, {}, {}};
   brick.values.fill(background);
@@ -139,10 +140,11 @@ BrickInput brickOfArray(const Dense& dense, Coord corner, float background, floa
     if (!dense.box.contains(voxel)) continue;
     const std::size_t place = dense.placeOf(voxel);
     if (dense.masked != nullptr && dense.masked[place]) continue;
+    if (dense.active != nullptr && !dense.active[place]) continue;
     const float value = dense.values[place];
     if (!std::isfinite(value))
       throw BadInput("the value of voxel " + toString(voxel) + " is not finite");
-    if (!(std::abs(value - background) > threshold)) continue;
+    if (dense.active == nullptr && !(std::abs(value - background) > threshold)) continue;
     brick.values[i] = value;
     brick.active.set(i);
   }
@@ -168,10 +170,35 @@ std::vector<BrickInput> bricksOf(const Dense& dense, float background, float thr
 struct ArrayOptions {
   float background, threshold;
   Corner origin;
-  double voxelSize;
+  std::optional<FlagArray> active;
+  Transform transform;
   std::string name;
-  bool levelSet;
+  GridClass gridClass;
+  std::vector<MetaItem> metadata;
 };
+
+/// The transform of a voxel size or of a matrix, of which one may be given.
+Transform transformOf(const std::optional<double>& voxelSize, const std::optional<Matrix>& matrix) {
+  if (voxelSize && matrix) throw UsageError("give voxel_size or transform, not both");
+  if (matrix) return transformFrom(*matrix);
+  const double side = voxelSize.value_or(1.0);
+  if (!(side > 0.0) || !std::isfinite(side))
+    throw UsageError("voxel_size must be finite and above 0");
+  return uniformTransform(side);
+}
+
+GridClass classOf(const std::string& name, bool levelSet) {
+  if (!levelSet) return classFrom(name);
+  if (name != className(GridClass::kFogVolume))
+    throw UsageError("give level_set or grid_class, not both");
+  return GridClass::kLevelSet;
+}
+
+void requireSameShape(const FlagArray& active, const FloatArray& values) {
+  const bool isSame = active.ndim() == 3 && active.shape(0) == values.shape(0) &&
+                      active.shape(1) == values.shape(1) && active.shape(2) == values.shape(2);
+  if (!isSame) throw UsageError("active must have the shape of the array");
+}
 
 /// The number of active voxels whose float differs from the number of the array.
 std::uint64_t roundedOf(const Numbers& numbers, const Dense& dense, const SparseVolume& volume) {
@@ -188,22 +215,23 @@ std::uint64_t roundedOf(const Numbers& numbers, const Dense& dense, const Sparse
 Volume fromNumpy(const py::object& array, const ArrayOptions& options) {
   if (!std::isfinite(options.background)) throw UsageError("background must be finite");
   if (!(options.threshold >= 0.0f)) throw UsageError("threshold must be 0 or above");
-  if (!(options.voxelSize > 0.0) || !std::isfinite(options.voxelSize))
-    throw UsageError("voxel_size must be finite and above 0");
   const Numbers numbers = numbersOf(array, options.origin);
+  if (options.active) requireSameShape(*options.active, numbers.values);
   const Coord side{std::int32_t(numbers.values.shape(0)), std::int32_t(numbers.values.shape(1)),
                    std::int32_t(numbers.values.shape(2))};
   const Coord first = coordOf(options.origin);
   const Dense dense{.values = numbers.values.data(),
                     .masked = numbers.masked ? numbers.masked->data() : nullptr,
+                    .active = options.active ? options.active->data() : nullptr,
                     .side = side,
                     .box = {first, first + (side - Coord{1, 1, 1})}};
   const py::gil_scoped_release release;
   auto grid = std::make_shared<VolumeGrid>();
   grid->descriptor.name = options.name;
-  grid->descriptor.gridClass = options.levelSet ? GridClass::kLevelSet : GridClass::kFogVolume;
+  grid->descriptor.gridClass = options.gridClass;
   grid->descriptor.background = options.background;
-  grid->descriptor.transform = uniformTransform(options.voxelSize);
+  grid->descriptor.transform = options.transform;
+  grid->descriptor.metadata = options.metadata;
   grid->volume =
       makeVolume(bricksOf(dense, options.background, options.threshold), options.background);
   const std::uint64_t rounded = roundedOf(numbers, dense, grid->volume);
@@ -217,29 +245,42 @@ Box boxOrActive(const SparseVolume& volume, const std::optional<PlainBox>& box) 
   return chosen;
 }
 
-py::array_t<float> toNumpy(const Volume& self, const std::optional<PlainBox>& plain) {
-  const SparseVolume& volume = self.grid->volume;
+/// An array over a box. \param valueAt  the element of a voxel by its brick and its offset there
+template <class T, class ValueAt>
+py::array_t<T> arrayOver(const SparseVolume& volume, const std::optional<PlainBox>& plain,
+                         T outside, const ValueAt& valueAt) {
   const Box box = boxOrActive(volume, plain);
   const auto length = [&](std::int32_t low, std::int32_t high) {
     return py::ssize_t(high) - low + 1;
   };
-  py::array_t<float> array(
+  py::array_t<T> array(
       {length(box.min.x, box.max.x), length(box.min.y, box.max.y), length(box.min.z, box.max.z)});
-  float* values = array.mutable_data();
+  T* values = array.mutable_data();
   const py::ssize_t ny = array.shape(1), nz = array.shape(2), size = array.size();
   const py::gil_scoped_release release;
-  std::fill(values, values + size, volume.background);
+  std::fill(values, values + size, outside);
   tbb::parallel_for(std::size_t(0), volume.brickCount(), [&](std::size_t b) {
     const Coord corner = volume.brickCorner(b);
-    const auto from = volume.brickValues(b);
     for (int i = 0; i < kBrickVoxels; ++i) {
       const Coord voxel = corner + voxelLocal(i);
       if (!box.contains(voxel)) continue;
       const Coord v = voxel - box.min;
-      values[(v.x * ny + v.y) * nz + v.z] = from[i];
+      values[(v.x * ny + v.y) * nz + v.z] = valueAt(b, i);
     }
   });
   return array;
+}
+
+py::array_t<float> toNumpy(const Volume& self, const std::optional<PlainBox>& box) {
+  const SparseVolume& volume = self.grid->volume;
+  return arrayOver(volume, box, volume.background,
+                   [&](std::size_t b, int i) { return volume.brickValues(b)[std::size_t(i)]; });
+}
+
+py::array_t<bool> activeIn(const Volume& self, const std::optional<PlainBox>& box) {
+  const SparseVolume& volume = self.grid->volume;
+  return arrayOver(volume, box, false,
+                   [&](std::size_t b, int i) { return volume.active[b].test(i); });
 }
 
 /// The place of the first grid that a fit can take.
@@ -292,19 +333,31 @@ void addVolume(py::module_& module) {
       .def_static(
           "from_numpy",
           [](const py::object& array, float background, const Corner& origin, float threshold,
-             double voxelSize, const std::string& name, bool levelSet) {
-            return fromNumpy(array, {background, threshold, origin, voxelSize, name, levelSet});
+             const std::optional<double>& voxelSize, const std::string& name, bool levelSet,
+             const std::optional<FlagArray>& active, const std::optional<Matrix>& transform,
+             const std::string& gridClass, const py::dict& metadata) {
+            return fromNumpy(
+                array, {background, threshold, origin, active, transformOf(voxelSize, transform),
+                        name, classOf(gridClass, levelSet), itemsOf(metadata)});
           },
           py::arg("array"), py::kw_only(), py::arg("background") = 0.0f,
-          py::arg("origin") = Corner{}, py::arg("threshold") = 0.0f, py::arg("voxel_size") = 1.0,
-          py::arg("name") = "density", py::arg("level_set") = false,
+          py::arg("origin") = Corner{}, py::arg("threshold") = 0.0f,
+          py::arg("voxel_size") = py::none(), py::arg("name") = "density",
+          py::arg("level_set") = false, py::arg("active") = py::none(),
+          py::arg("transform") = py::none(), py::arg("grid_class") = "fog volume",
+          py::arg("metadata") = py::dict(),
           "Makes a volume from an array of shape (nx, ny, nz), converted to float32.\n\n"
-          "A voxel is active if it differs from the background by more than the threshold.\n"
+          "A voxel is active if it differs from the background by more than the threshold, or, "
+          "with\n"
+          "active (bool of the same shape), where that is true.\n"
           "Elements that a masked array hides are not active, whatever their values are.\n"
           "Integers that float32 does not have (2**24 + 1), numbers beyond its range, dates,\n"
           "records, text and complex numbers are refused. Volume.rounded_values counts active\n"
           "voxels whose double was rounded.\n"
-          "origin is the voxel of array[0, 0, 0], and voxel_size is in world units.")
+          "origin is the voxel of array[0, 0, 0]. voxel_size is in world units (default: 1);\n"
+          "transform is the 4 x 4 matrix from index to world coordinates, for column vectors.\n"
+          "grid_class is 'fog volume' or 'unknown'. metadata has texts, numbers, truth values and\n"
+          "tuples of three integers or floats.")
       .def_static(
           "from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
           "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default. It is named\n"
@@ -314,6 +367,8 @@ void addVolume(py::module_& module) {
       .def("to_numpy", &toNumpy, py::arg("box") = py::none(),
            "The voxels of a box ((x0, y0, z0), (x1, y1, z1)), both inclusive, as float32 of shape\n"
            "(nx, ny, nz); by default those of Volume.box.")
+      .def("active", &activeIn, py::arg("box") = py::none(),
+           "Which voxels of a box are active: bool of shape (nx, ny, nz).")
       .def(
           "save",
           [](const Volume& v, const std::filesystem::path& path, bool overwrite) {
@@ -329,12 +384,14 @@ void addVolume(py::module_& module) {
             write(v, path, {.half = HalfMode::kOff});
           },
           py::arg("path"))
-      .def_property_readonly("name", [](const Volume& v) { return v.grid->descriptor.name; })
+      .def_property_readonly(
+          "name", [](const Volume& v) { return v.grid->descriptor.name; }, "The name of the grid.")
       .def_property_readonly(
           "grid_class", [](const Volume& v) { return className(v.grid->descriptor.gridClass); },
           "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
-      .def_property_readonly("background",
-                             [](const Volume& v) { return v.grid->volume.background; })
+      .def_property_readonly(
+          "background", [](const Volume& v) { return v.grid->volume.background; },
+          "The value of voxels that are not active.")
       .def_property_readonly(
           "active_voxels", [](const Volume& v) { return activeVoxelCount(v.grid->volume); },
           "Number of active voxels.")
@@ -360,7 +417,14 @@ void addVolume(py::module_& module) {
           "range of which --max-error takes a percentage.")
       .def_property_readonly(
           "transform", [](const Volume& v) { return matrixOf(v.grid->descriptor.transform); },
-          "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.");
+          "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
+      .def_property_readonly(
+          "metadata", [](const Volume& v) { return dictOf(v.grid->descriptor.metadata); },
+          "The grid's metadata that are texts, numbers, truth values or three numbers.")
+      .def_property_readonly(
+          "bytes", [](const Volume& v) { return bytesInMemory(v.grid->volume); },
+          "Number of bytes of memory that the voxels take.")
+      .def("__repr__", [](const Volume& v) { return describe(v); });
 }
 
 }  // namespace esvr::python

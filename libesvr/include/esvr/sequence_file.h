@@ -117,6 +117,11 @@ class SequenceReader {
   /// \throws BadInput  there is no such frame, or it is damaged
   [[nodiscard]] EsvrSummary inspect(std::int64_t number);
 
+  /// The first frame with the properties and the metadata of its grids, but without their data, as
+  /// readEsvrPart reads it with an empty ReadPart::grids. Nothing is decoded.
+  /// \throws BadInput  the frame is damaged
+  [[nodiscard]] EsvrFile propertiesOfFirst() const;
+
   /// Bytes that were read from the file so far.
   [[nodiscard]] std::uint64_t bytesRead() const;
 

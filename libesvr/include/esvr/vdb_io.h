@@ -42,6 +42,7 @@ struct GridSummary {
   /// True if readVector can read the grid: its values are of type "vec3s" or "vec3d" and it has an
   /// active voxel. A level set of vectors cannot be read.
   bool isVector = false;
+  std::vector<MetaItem> metadata{};  ///< of the grid, as GridDescriptor::metadata (grid.h)
 };
 
 struct VdbSummary {
@@ -104,7 +105,7 @@ struct ReadOptions {
 [[nodiscard]] VolumeGrid readGrid(const std::filesystem::path& path, const std::string& name,
                                   const ReadOptions& options = {});
 
-/// Reads a component of a grid of vectors in a .vdb file, as readGrid reads a grid of numbers. The
+/// Reads a component of a grid of vectors, as readGrid reads a grid of numbers. The
 /// name of the result is componentName(). The component x has the metadata of the grid; the others
 /// have none, so that a file with all of them holds the metadata once.
 /// \param place      as for readGrid
@@ -197,10 +198,14 @@ using GridToWrite =
 /// in any component.
 /// \throws RuntimeFailure  as for writeGrids; a carried grid has a version of the VDB format that
 ///                         this version of OpenVDB does not write
-/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid is carried, has vectors or
-///                      is packed and not of type "float"
+/// \throws UsageError  as for writeGrids; the extension is .nvdb, and a grid has whyNotNano()
 void writeGrids(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
                 std::span<const GridToWrite> grids, const WriteOptions& options = {});
+
+/// The reason, for the user, why writeGrids cannot write a grid to a .nvdb file; else empty. NanoVDB's files
+/// hold numbers and vectors of affine transforms, also those of carried grids that can be read (readGrid,
+/// readVector), but no halfs.
+[[nodiscard]] std::string whyNotNano(const GridToWrite& grid);
 
 /// Name of the file-level metadata item that names the writer. writeGrids adds it if
 /// `fileMetadata` has no item of this name.

@@ -1,5 +1,6 @@
 """The manifest follows the rules of Blender's documentation, and agrees with bl_info and the version of the project."""
 import pathlib
+import re
 import tomllib
 
 import esvr
@@ -29,3 +30,18 @@ def test_the_versions_agree():
 def test_every_file_names_its_licence():
     for path in [*FOLDER.glob("*.py"), *FOLDER.glob("*.toml"), FOLDER.parent / "pack.py"]:
         assert "SPDX-License-Identifier: GPL-3.0-or-later" in path.read_text(), path
+
+
+def test_names_are_those_that_blender_knows():
+    assert re.fullmatch(r"[a-z][a-z0-9_]*[a-z0-9]", MANIFEST["id"]) and "__" not in MANIFEST["id"]
+    assert re.fullmatch(r"\d+\.\d+\.\d+", MANIFEST["version"])
+    assert set(MANIFEST["permissions"]) <= {"files", "network", "clipboard", "camera", "microphone"}
+    assert set(MANIFEST["tags"]) <= {"Import-Export", "Render", "Pipeline", "Physics"}  # of Blender's list, those that fit
+    required = {"schema_version", "id", "version", "name", "tagline", "maintainer", "type", "blender_version_min", "license"}
+    assert required <= set(MANIFEST) <= required | {"tags", "permissions"}
+
+
+def test_modules_find_each_other_wherever_blender_puts_them():
+    """An extension is bl_ext.REPOSITORY.esvr_blender, so that imports are relative, and only the module of the decoder is not."""
+    for path in FOLDER.glob("*.py"):
+        assert not re.search(r"^\s*(?:from|import) esvr_blender", path.read_text(), re.MULTILINE), path

@@ -18,6 +18,7 @@ import traceback
 import warnings
 
 import esvr
+from esvr._core import _did_you_mean
 
 from .image import unit_named
 
@@ -52,6 +53,12 @@ class Parser(argparse.ArgumentParser):
                          for names in ("-q --quiet", "-v --verbose", "-h --help", "--version")]
 
     def error(self, message):
+        unknown = re.match(r"unrecognized arguments: (?:.* )??(--[^ =]+)", message)
+        refused = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)$", message)
+        if unknown:
+            message += _did_you_mean(unknown[1], [action.option_strings[-1] for action in self.options])
+        elif refused:
+            message += _did_you_mean(refused[1], re.findall(r"'([^']*)'", refused[2]))
         raise esvr.UsageError(message)
 
     def parse(self, words):

@@ -1,0 +1,134 @@
+"""Objects are pickled and copied, within this process and by others, and say what they are."""
+import copy
+import multiprocessing
+import pickle
+
+import numpy as np
+import pytest
+
+import esvr
+
+
+def again(thing):
+    return pickle.loads(pickle.dumps(thing, protocol=pickle.HIGHEST_PROTOCOL))
+
+
+def same_volumes(a, b):
+    assert (a.name, a.grid_class, a.background, a.box, a.metadata) == (b.name, b.grid_class, b.background, b.box, b.metadata)
+    assert np.array_equal(a.transform, b.transform)
+    if a.box:
+        assert a.to_numpy().tobytes() == b.to_numpy().tobytes()
+        assert np.array_equal(a.active(), b.active())
+
+
+def test_volumes_come_back(volume):
+    same_volumes(again(volume), volume)
+
+
+def test_everything_of_a_volume_comes_back():
+    array = np.array([[[0.1, 2, 3, 0]]])
+    volume = esvr.Volume.from_numpy(array, background=-1, name="ü", metadata={"unit": "K", "n": 3}, voxel_size=0.5)
+    back = again(volume)
+    same_volumes(back, volume)
+    assert back.rounded_values == volume.rounded_values == 1
+    assert pickle.dumps(back) == pickle.dumps(volume)
+    empty = esvr.Volume.from_numpy(np.zeros((2, 2, 2)))
+    assert again(empty).active_voxels == 0 and again(empty).box is None
+
+
+def test_the_inside_of_a_level_set_comes_back(tmp_path):
+    x, y, z = np.mgrid[-20:21, -20:21, -20:21]
+    distance = np.clip(np.sqrt(x * x + y * y + z * z) - 14, -3, 3)
+    volume = esvr.Volume.from_numpy(distance, background=3, level_set=True, origin=(-20, -20, -20))
+    volume.save(tmp_path / "s.vdb")
+    packed = esvr.PackedGrid.from_file(tmp_path / "s.vdb")
+    box = ((-20, -20, -20), (20, 20, 20))
+    assert (packed.to_numpy(box) < 0)[20, 20, 20]
+    assert np.array_equal(again(packed).to_numpy(box), packed.to_numpy(box))
+
+
+@pytest.mark.parametrize("kind, dtype", [("float", "f4"), ("double", "f8"), ("int32", "i4"), ("int64", "i8"), ("bool", "?"),
+                                         ("vec3s", "f4")])
+def test_packed_grids_come_back(kind, dtype):
+    values = np.arange(1, 2 * 3 * 4 * (3 if kind == "vec3s" else 1) + 1).reshape(2, 3, 4, *[3] * (kind == "vec3s"))
+    builder = esvr.GridBuilder(kind, name="n", metadata={"a": 1.5})
+    for x in (0, 8):
+        builder.add(values.astype(dtype), origin=(x, 0, 0))
+    grid = builder.finish()
+    back = again(grid)
+    assert np.array_equal(back.to_numpy(), grid.to_numpy()) and back.to_numpy().dtype == grid.to_numpy().dtype
+    assert (back.name, back.value_type, back.box, back.metadata) == (grid.name, grid.value_type, grid.box, {"a": 1.5})
+
+
+def test_grids_and_files_come_back(volume, grid, tmp_path):
+    back = again(grid)
+    assert np.array_equal(back.to_volume().to_numpy(), grid.to_volume().to_numpy())
+    assert back.bytes == grid.bytes and back.kind == grid.kind
+    volume.save(tmp_path / "a.vdb")
+    file = esvr.convert([volume, esvr.Volume.from_numpy(np.ones((3, 3, 3)), name="b")], psnr=40, device="cpu")
+    other = again(file)
+    assert other.names == file.names
+    esvr.write(tmp_path / "a.esvr", file), esvr.write(tmp_path / "b.esvr", other)
+    assert (tmp_path / "a.esvr").read_bytes() == (tmp_path / "b.esvr").read_bytes()
+    metrics = esvr.compare(volume, grid)
+    assert repr(again(metrics)) == repr(metrics) and again(metrics).psnr_t50 == metrics.psnr_t50
+    ellipsoids = again(grid.ellipsoids)
+    assert np.array_equal(ellipsoids.mu, grid.ellipsoids.mu) and not ellipsoids.kappa.flags.writeable
+
+
+def psnr_of(volume, grid):
+    return esvr.compare(volume, grid).psnr_box
+
+
+def test_other_processes_take_and_give_them(volume, grid):
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(psnr_of, (volume, grid)) == psnr_of(volume, grid)
+
+
+def test_voxels_are_passed_on_without_a_copy(volume):
+    buffers = []
+    data = pickle.dumps(volume, protocol=5, buffer_callback=buffers.append)
+    assert len(data) < 2000 and sum(len(b.raw()) for b in buffers) > 50_000
+    same_volumes(pickle.loads(data, buffers=buffers), volume)
+
+
+def test_copies_are_the_objects_themselves(volume, grid):
+    for thing in (volume, grid, grid.ellipsoids):
+        assert copy.copy(thing) is thing and copy.deepcopy([thing])[0] is thing
+
+
+def test_damaged_pickles_are_refused(volume):
+    restore, (state,) = volume.__reduce__()
+    with pytest.raises(esvr.BadInput, match="another version"):
+        restore((99, *state[1:]))
+    voxels = state[2]
+    for wrong in ((voxels[0], voxels[1], voxels[2][:-1], *voxels[3:]), (*voxels[:4], voxels[4][:-1]),
+                  (voxels[0], voxels[1], voxels[2][::-1], *voxels[3:])):
+        with pytest.raises(esvr.BadInput, match="damaged"):
+            restore((*state[:2], wrong, *state[3:]))
+
+
+def test_sequences_open_their_file_again(volume, tmp_path):
+    import os
+    import subprocess
+    if "ESVR_BIN" not in os.environ:
+        pytest.skip("there is no vdb2esvr")
+    for number in (1, 2):
+        volume.save(tmp_path / f"f.{number}.vdb")
+    subprocess.run([f"{os.environ['ESVR_BIN']}/vdb2esvr/vdb2esvr", tmp_path / "f.@.vdb", tmp_path / "f.esvr", "--preset", "draft",
+                    "--quiet"], check=True)
+    sequence = esvr.Sequence(tmp_path / "f.esvr")
+    assert again(sequence).frames == copy.copy(sequence).frames == [1, 2]
+    assert repr(sequence).startswith("<esvr.Sequence '") and "2 frames" in repr(sequence)
+
+
+def test_repr_says_shape_values_transform_and_bytes(volume, grid):
+    assert repr(volume) == (f"<esvr.Volume 'density': fog volume, 19 x 19 x 19 voxels from (0, 103, 10), {volume.active_voxels} "
+                            "active, values 0.01 to 1, voxel size 0.5, 57.3 KB of memory>")
+    assert repr(grid).startswith("<esvr.Grid 'density': fog volume, 40 ellipsoids, 19 x 19 x 19 voxels from (0, 103, 10)")
+    assert "values 0.01 to 1, voxel size 0.5, " in repr(grid) and repr(grid).endswith(" of a file>")
+    file = esvr.convert([volume], preset="draft", device="cpu")
+    assert repr(file).startswith("<esvr.File: 1 grid (density), ") and repr(file).endswith(" of memory>")
+    turned = esvr.Volume.from_numpy(np.ones((1, 1, 1)), transform=[[0, 2, 0, 0], [-1, 0, 0, 0], [0, 0, 3, 0], [0, 0, 0, 1]])
+    assert "voxel size 1 x 2 x 3, turned or sheared" in repr(turned)
+    assert "no active voxel" in repr(esvr.Volume.from_numpy(np.zeros((1, 1, 1))))
