@@ -1,6 +1,9 @@
 // The main function of vdb2esvr after its options are read: one file.
 #include "vdb2esvr/run.h"
 
+#include <sched.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <future>
@@ -476,6 +479,22 @@ void tellWhatSurvives(const Options& options, const cli::Log& log) {
       "the finished parts in any case");
 }
 
+/// The number of cores that a process may use (0: this one), or 0 if the system does not tell.
+int coresOf(pid_t process) {
+  cpu_set_t cores;
+  return ::sched_getaffinity(process, sizeof cores, &cores) == 0 ? CPU_COUNT(&cores) : 0;
+}
+
+/// Open MPI binds each of one or two ranks to a core, on which all work of the host then runs. Its own
+/// process may use what the ranks of this host have together.
+void warnOfFewCores(const Ranks& ranks, const cli::Log& log) {
+  const int own = coresOf(0), all = coresOf(::getppid());
+  if (own == 0 || 2 * own * ranks.ranksOnHost() > all) return;
+  log.warning("each of the " + std::to_string(ranks.ranksOnHost()) + " ranks of this host uses " +
+              std::to_string(own) + " of its " + std::to_string(all) +
+              " cores; mpirun --bind-to none gives them all cores");
+}
+
 int runAs(const Options& options, Ranks* ranks) {
   const cli::Log log(kProgram, options.verbosity);
   const cli::ThreadLimit threads(options.threads);
@@ -483,7 +502,10 @@ int runAs(const Options& options, Ranks* ranks) {
                                    : cli::FurtherSignals::kEndAtOnce);
   if (!options.keepsBest()) interrupts.discardResults();
   checkFiles(options);
-  if (ranks) tellWhatSurvives(options, log);
+  if (ranks) {
+    tellWhatSurvives(options, log);
+    warnOfFewCores(*ranks, log);
+  }
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);
   if (options.onlyFits) {
     if (record.interrupted) throw RuntimeFailure("interrupted");  // as rank 0 does

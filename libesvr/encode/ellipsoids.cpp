@@ -44,7 +44,7 @@ bool isToned(const Job& job) { return job.judge && job.judge->tone().isOn(); }
 bool seesPictures(const Job& job) { return job.judge && job.judge->seesPictures(); }
 
 double psnrOf(const Job& job, SparseVolume volume) {
-  if (job.judge) return (*job.judge)(std::move(volume));
+  if (job.judge) return (*job.judge)(std::move(volume)).quality;
   return psnrOverBox(job.input.source, volume,
                      {.box = job.options.fit.box, .peak = job.options.fit.peak});
 }
@@ -282,12 +282,14 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   result.asked = *options.count;
   result.fit = fit(job.input.source, options);
   result.grid = storedGridOf(job, result.fit);
-  const auto psnr = unlessCancelled([&]() -> std::optional<double> {
+  const auto judged = unlessCancelled([&]() -> std::optional<Judge::Judgement> {
     if (result.cancelled()) return std::nullopt;
-    return psnrOf(job, result.grid);
+    if (!job.judge) return Judge::Judgement{psnrOf(job, result.grid)};
+    return (*job.judge)(decodeGrid(result.grid, {.memory = memoryOf(job.input.source)}));
   });
-  if (!psnr) result.fit.end = FitEnd::kCancelled;
-  result.psnr = psnr.value_or(lastPsnr(result.fit));
+  if (!judged) result.fit.end = FitEnd::kCancelled;
+  result.psnr = judged ? judged->quality : lastPsnr(result.fit);
+  result.forTones = judged ? judged->forTones : 0.0;
   return result;
 }
 

@@ -16,6 +16,7 @@ struct Attempt {
   FitResult fit;          ///< its field was moved to the grid
   StoredGrid grid;        ///< grid in float32
   double psnr = 0.0;      ///< quality, dB
+  double forTones = 0.0;  ///< Judge::Judgement::forTones
   std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
 
   [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }

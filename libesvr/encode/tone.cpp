@@ -77,18 +77,13 @@ void Judge::toValues(SparseVolume& volume) const {
   if (halfs_) roundToHalfs(volume);
 }
 
-double Judge::operator()(SparseVolume volume) const {
+Judge::Judgement Judge::operator()(SparseVolume volume) const {
   toValues(volume);
   const auto ofValues = [&] { return psnrOverBox(values_, volume, box_); };
-  if (!pictures_) return ofValues();
-  const double ofPictures = pictures_->measure(volume).psnr50;
-  return valueGain_ ? std::min(ofPictures, ofValues() + *valueGain_) : ofPictures;
-}
-
-double Judge::forTones(SparseVolume volume) const {
-  toValues(volume);
+  if (!pictures_) return {ofValues()};
   const TransmittancePsnr seen = pictures_->measure(volume);
-  return 0.5 * (seen.psnr50 + seen.psnr10);
+  return {valueGain_ ? std::min(seen.psnr50, ofValues() + *valueGain_) : seen.psnr50,
+          0.5 * (seen.psnr50 + seen.psnr10)};
 }
 
 // ---- The total mass
@@ -176,19 +171,12 @@ ToneCurve likelyTone(const SparseVolume& volume) {
   return {float(std::cbrt(median * quartile * quartile))};
 }
 
-/// A short fit with a curve, and its quality for the comparison of curves.
-struct ToneTrial {
-  Attempt made;
-  double quality = 0.0;
-};
-
-ToneTrial tried(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options) {
+/// A short fit with a curve.
+Attempt tried(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options) {
   const Judge judge(input, options, tone);
   const SparseVolume tones = tone.isOn() ? tonesOf(input.source, tone) : SparseVolume{};
   const ConvertInput toned{input.descriptor, tone.isOn() ? tones : input.source};
-  ToneTrial trial{scoutingFit({toned, options, &judge})};
-  trial.quality = judge.forTones(decodeGrid(trial.made.grid, {.memory = memoryOf(input.source)}));
-  return trial;
+  return scoutingFit({toned, options, &judge});
 }
 
 }  // namespace
@@ -205,10 +193,10 @@ ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options) 
   const ToneCurve likely = likelyTone(input.source);
   if (!likely.isOn() || options.effort == kLeastEffort) return {likely};
   auto choice = unlessCancelled([&] {
-    ToneTrial with = tried(likely, input, options), without = tried({}, input, options);
-    return std::optional(with.quality - without.quality > kTuning.toneGain
-                             ? ToneChoice{likely, std::move(with.made)}
-                             : ToneChoice{{}, std::move(without.made)});
+    Attempt with = tried(likely, input, options), without = tried({}, input, options);
+    return std::optional(with.forTones - without.forTones > kTuning.toneGain
+                             ? ToneChoice{likely, std::move(with)}
+                             : ToneChoice{{}, std::move(without)});
   });
   return choice ? std::move(*choice) : ToneChoice{};
 }

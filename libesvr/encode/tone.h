@@ -22,12 +22,14 @@ class Judge {
 
   [[nodiscard]] bool seesPictures() const { return pictures_.has_value(); }
 
-  /// \param volume  decoded tones
-  [[nodiscard]] double operator()(SparseVolume volume) const;
-
-  /// The mean of the transmittance's PSNR for T = 0.5 and 0.1, dB: of two tone curves, the one that is
-  /// better for thin and for dense smoke.
-  [[nodiscard]] double forTones(SparseVolume volume) const;
+  /// What a judge says of decoded tones, dB.
+  struct Judgement {
+    double quality = 0.0;
+    /// The mean of the transmittance's PSNR for T = 0.5 and 0.1; 0 unless pictures are seen. Of two tone curves, the one
+    /// for which it is larger is better for thin and for dense smoke.
+    double forTones = 0.0;
+  };
+  [[nodiscard]] Judgement operator()(SparseVolume volume) const;
 
   /// The total mass of the source; 0 unless pictures are seen.
   [[nodiscard]] double mass() const { return mass_; }

@@ -277,7 +277,7 @@ double VoxelSearch::shareOf(const SparseVolume& volume) const {
 
 double VoxelSearch::psnrOn(const SparseVolume& volume, const VoxelLayer& layer) const {
   SparseVolume made = volumeOf(layer);
-  if (job_.judge && &volume == &job_.input.source) return (*job_.judge)(std::move(made));
+  if (job_.judge && &volume == &job_.input.source) return (*job_.judge)(std::move(made)).quality;
   if (decodedValues(job_) == DecodedValues::kHalfs) roundToHalfs(made);
   return psnrOverBox(volume, made, {.box = box_, .peak = peak_}) +
          10.0 * std::log10(shareOf(volume)) + judged_;

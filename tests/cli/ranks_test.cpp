@@ -115,6 +115,17 @@ TEST_F(RanksTest, SayOnceWhatIsWrongForAll) {
   EXPECT_EQ(help.out, test::runProgram(VDB2ESVR, {"--help"}).out);
 }
 
+TEST_F(RanksTest, WarnsWhereARankUsesFewOfItsCores) {
+  if (std::thread::hardware_concurrency() < 2) GTEST_SKIP() << "one core is all that there is";
+  const auto bound = onRanks("1", conversion("out.esvr", {}));
+  EXPECT_EQ(countOf("--bind-to none", bound.err), 1u) << bound.err;
+  auto command = conversion("out.esvr", {"--force"});
+  command.insert(command.begin(), {"--bind-to", "none"});
+  const auto free = onRanks("1", command);
+  EXPECT_EQ(free.exitCode, 0);
+  EXPECT_EQ(countOf("--bind-to none", free.err), 0u) << free.err;
+}
+
 TEST_F(RanksTest, SaysWhichRankFailsAlone) {
   const auto run = withRankOne("exec \"$1\" " + at("none.vdb") + " " + at("out.esvr"),
                                conversion("out.esvr", {"--chunk-voxels", "600"}));
