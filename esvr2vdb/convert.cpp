@@ -69,7 +69,9 @@ struct ComparedGrid {
 };
 
 ReadOptions readingOf(const Options& options) {
-  return {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+  return {.nonFinite = NonFinite::kKeep,
+          .maxBytes = options.memory.maxBytes,
+          .memory = options.memory.voxels};
 }
 
 /// The two files of a comparison.
@@ -343,9 +345,8 @@ std::optional<std::array<float, 2>> rangeIn(const Options& options, const VdbSum
                                             std::size_t place) {
   const GridSummary& grid = file.grids[place];
   if (grid.activeVoxels == 0 || !(grid.isScalar || grid.isVector)) return std::nullopt;
-  const ReadOptions read{.maxBytes = options.memory.maxBytes,
-                         .memory = options.memory.voxels,
-                         .directory = file.directory};
+  ReadOptions read = readingOf(options);
+  read.directory = file.directory;
   const VolumeGrid voxels = grid.isVector ? readComponent(*options.reference, place, 0, read)
                                           : readGrid(*options.reference, place, read);
   const ValueRange range = activeRange(voxels.volume);

@@ -51,7 +51,7 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
   pictures_.emplace(input.source, options.fit.box);
   if (leavesTheMeasure(options.goal))
     valueGain_ = (tone.isOn() ? kTuning.picturesAboveValues : -kPicturesBelowValues) -
-                 boxGain(input.source, options.fit.box);
+                 boxGain(input.source, options);
 }
 
 /// Turns tones into values, as a reader of the grid does.

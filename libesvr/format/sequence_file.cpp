@@ -12,6 +12,7 @@
 #include "format/decode.h"
 #include "format/encode.h"
 #include "format/frame_table.h"
+#include "format/non_finite_section.h"
 #include "format/sequence_index.h"
 
 namespace esvr {
@@ -44,11 +45,14 @@ bool dependsOnPrevious(std::span<const std::byte> bytes) {
 }
 
 std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous) {
-  const std::uint64_t own = bytesAdded(grid);
+  const std::uint64_t nonFinite = bytesOfNonFinite(grid);
+  const std::uint64_t own = bytesAdded(grid) - nonFinite;
   if (previous)
-    if (const auto difference = differenceOf(grid, *previous, own))
-      return difference->size() + kFrameRowBytes;
-  return own;
+    if (const auto difference = differenceOf(grid, *previous, own)) {
+      const bool isSame = previous->nonFiniteVoxels == grid.nonFiniteVoxels;
+      return difference->size() + kFrameRowBytes + (isSame ? 0 : nonFinite);
+    }
+  return own + nonFinite;
 }
 
 // ---- The reader

@@ -367,8 +367,7 @@ void readNanoAs(const NanoBuffer& buffer, const ReadOptions& options, VolumeGrid
                         kHasExactValues<Build>};
   auto corners = brickCorners(tree, options);
   SparseVolume& volume = grid.volume = layOutBricks(corners, rules, options.memory);
-  FillTallies tallies{{.replacement = rules.replacement()},
-                      InactiveCounter(tree.background(), rules.levelSet)};
+  FillTallies tallies{rules.tally(), InactiveCounter(tree.background(), rules.levelSet)};
   tree.visit(
       [&](Coord corner, const Leaf& leaf) {
         if (Access::mask(leaf).count() == 0)

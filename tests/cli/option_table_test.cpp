@@ -55,7 +55,7 @@ Table vdb2esvrTests() {
           {"--max-vram", "Vdb2EsvrOption.maxVramBoundsTheDevicesMemoryOnGpu"},
           {"--measure", "Vdb2EsvrOption.measureSaysWhatAPresetMeans"},
           {"--missing", "SequenceFiles.mayBeHeldOrSkippedWhereTheyAreMissing"},
-          {"--nonfinite", "Vdb2Esvr.takesNonFiniteVoxelsAsZeroWhereAskedAndSaysHowMany"},
+          {"--nonfinite", "NonFiniteFile.comesBackInEveryFormAndOutput"},
           {"--on-error", "SequenceFiles.stopAfterADamagedOneWhereAsked"},
           {"--paper", "Vdb2Esvr.reportsWhatThePapersMethodUsed"},
           {"--picture-psnr", "Vdb2EsvrOption.picturePsnrIsReached"},

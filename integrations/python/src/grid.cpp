@@ -80,7 +80,7 @@ py::array_t<float> evaluate(const Grid& self, const Places& points) {
   if (!followsFromEllipsoids(grid))
     throw UsageError(
         "grid '" + shownName(grid.descriptor.name) +
-        "' stores voxels or a residual, so that there is no sum to evaluate; decode it "
+        "' stores voxels, a residual or NaN, so that there is no sum to evaluate; decode it "
         "with to_volume()");
   py::array_t<float> values(points.shape(0));
   const std::span places(reinterpret_cast<const Place*>(points.data()),
@@ -184,7 +184,10 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "value_range",
           [](const Grid& g) { return std::pair(g.grid->valueMin, g.grid->valueMax); },
-          "The smallest and the largest active value of the source.")
+          "The smallest and the largest finite active value of the source.")
+      .def_property_readonly(
+          "nonfinite", [](const Grid& g) { return g.grid->nonFinite.total(); },
+          "Number of active voxels of the source that are NaN or infinite, and come back so.")
       .def_property_readonly(
           "tone",
           [](const Grid& g) {
@@ -328,9 +331,16 @@ bool isLossless(const ConvertOptions& options) {
   return std::holds_alternative<LosslessGoal>(options.goal);
 }
 
-FileSource sourceOf(const ConvertedSource& given, bool lossless) {
+/// Refuses volumes with voxels that are not finite, unless they are to be kept.
+void requireFinite(const Volume& volume, NonFinite nonFinite) {
+  if (nonFinite != NonFinite::kKeep && hasNonFinite(volume.grid->volume))
+    throw BadInput("grid '" + shownName(volume.grid->descriptor.name) +
+                   "' has voxels that are not finite; nonfinite='keep' keeps them");
+}
+
+FileSource sourceOf(const ConvertedSource& given, bool lossless, NonFinite nonFinite) {
   if (const auto* path = std::get_if<std::filesystem::path>(&given))
-    return readSources(*path, lossless, {.maxBytes = usualMemoryLimit()});
+    return readSources(*path, lossless, {.nonFinite = nonFinite, .maxBytes = usualMemoryLimit()});
   FileSource source;
   for (const auto& [grid, rounded] : std::get<std::vector<Volume>>(given)) {
     const std::uint64_t active = activeVoxelCount(grid->volume);
@@ -344,12 +354,12 @@ FileSource sourceOf(const ConvertedSource& given, bool lossless) {
   return source;
 }
 
-File convertSource(const ConvertedSource& given, const ConvertOptions& options,
-                   const Progress& progress) {
+File convertSource(const ConvertedSource& given, const ConvertOptions& options, NonFinite nonFinite,
+                   const Progress& progress) try {
   ConvertedFile made = reporting(options, progress, [&](const ConvertOptions& common) {
     FileOptions ofFile{.convert = common};
     if (const auto* size = std::get_if<SizeGoal>(&common.goal)) ofFile.size = size->bytes;
-    return convertGrids(sourceOf(given, isLossless(common)), ofFile);
+    return convertGrids(sourceOf(given, isLossless(common), nonFinite), ofFile);
   });
   if (made.interrupted) throw Cancelled();
   if (std::holds_alternative<PsnrGoal>(options.goal))  // a preset is as good as the grids allow
@@ -374,6 +384,8 @@ constexpr const char* kConvertText =
     "grids of equal voxels once, vectors, grids that are carried unchanged, and voxels that refer "
     "to\n"
     "those of a grid that is like them. size is that of the file. ";
+} catch (const NotFinite& error) {
+  throw BadInput(error.what() + std::string("; nonfinite='keep' stores where they are"));
 
 constexpr const char* kGoalText =
     "One of the goals may be given:\n\n"
@@ -412,10 +424,13 @@ void defineConversion(py::module_& module, const char* name, const char* source,
                     std::optional<double> picturePsnr, std::optional<double> maxError,
                     std::optional<double> maxRelativeError, std::optional<double> relativeFloor,
                     std::optional<std::uint64_t> size, std::optional<std::size_t> count,
+    "nonfinite: 'refuse' NaN and infinite voxels, or 'keep' them: they come back where they were, "
+    "and\n"
+    "the goal and all errors are those of the other voxels.\n"
                     bool lossless, const std::string& preset, const std::string& measure,
                     std::optional<float> tone, int effort, const std::string& representation,
-                    const std::string& storage, const std::string& device, std::uint64_t seed,
-                    const Progress& progress) {
+                    const std::string& storage, const std::string& nonFinite,
+                    const std::string& device, std::uint64_t seed, const Progress& progress) {
         ConvertOptions options;
         options.goal = goalOf(
             {psnr, picturePsnr, maxError, maxRelativeError, relativeFloor, size, count, lossless});
@@ -434,7 +449,7 @@ void defineConversion(py::module_& module, const char* name, const char* source,
         options.fit.count = count;
         options.fit.seed = seed;
         options.fit.device = selectDevice(device);
-        return convertFrom(from, options, progress);
+        return convertFrom(from, options, nonFiniteOf(nonFinite), progress);
       },
       py::arg(source), py::kw_only(), py::arg("psnr") = py::none(),
       py::arg("picture_psnr") = py::none(), py::arg("max_error") = py::none(),
@@ -442,26 +457,31 @@ void defineConversion(py::module_& module, const char* name, const char* source,
       py::arg("size") = py::none(), py::arg("count") = py::none(), py::arg("lossless") = false,
       py::arg("preset") = "standard", py::arg("measure") = "auto", py::arg("tone") = py::none(),
       py::arg("effort") = kUsualEffort, py::arg("representation") = "auto",
-      py::arg("storage") = "compact", py::arg("device") = "auto", py::arg("seed") = 1,
-      py::arg("progress") = py::none(), (std::string(text) + kGoalText).c_str());
+      py::arg("storage") = "compact", py::arg("nonfinite") = "refuse", py::arg("device") = "auto",
+      py::arg("seed") = 1, py::arg("progress") = py::none(),
+      (std::string(text) + kGoalText).c_str());
 }
 
 }  // namespace
 
 void addFit(py::module_& module) {
-  defineConversion<Volume>(
-      module, "fit", "volume", kFitText,
-      [](const Volume& volume, const ConvertOptions& options, const Progress& progress) {
-        if (isLossless(options)) tellLostValues(volume);
-        return fitVolume(volume, options, progress);
-      });
+  defineConversion<Volume>(module, "fit", "volume", kFitText,
+                           [](const Volume& volume, const ConvertOptions& options,
+                              NonFinite nonFinite, const Progress& progress) {
+                             requireFinite(volume, nonFinite);
+                             if (isLossless(options)) tellLostValues(volume);
+                             return fitVolume(volume, options, progress);
+                           });
   defineConversion<ConvertedSource>(
       module, "convert", "source", kConvertText,
-      [](const ConvertedSource& source, const ConvertOptions& options, const Progress& progress) {
+      [](const ConvertedSource& source, const ConvertOptions& options, NonFinite nonFinite,
+         const Progress& progress) {
         if (const auto* volumes = std::get_if<std::vector<Volume>>(&source); volumes)
-          for (const Volume& volume : *volumes)
+          for (const Volume& volume : *volumes) {
+            requireFinite(volume, nonFinite);
             if (isLossless(options)) tellLostValues(volume);
-        return convertSource(source, options, progress);
+          }
+        return convertSource(source, options, nonFinite, progress);
       });
 }
 

@@ -59,6 +59,9 @@ using PlainBox = std::array<Corner, 2>;
 /// The matrix from index to world coordinates, for column vectors; None for a frustum.
 [[nodiscard]] py::object matrixOf(const Transform& transform);
 
+/// What the argument `nonfinite` says. \throws UsageError  it is neither 'refuse' nor 'keep'
+[[nodiscard]] NonFinite nonFiniteOf(const std::string& word);
+
 /// The voxels of a stored grid, with the GIL released.
 /// \throws UsageError  the box is empty
 /// \throws MemoryExceeded  they need more than the limit

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -23,6 +24,7 @@ struct Dense {
   const bool* masked;  ///< null: no element is masked
   Coord side;
   Box box;
+  bool keepsNonFinite = false;
 
   [[nodiscard]] std::size_t placeOf(Coord voxel) const {
     const Coord v = voxel - box.min;
@@ -131,6 +133,7 @@ Numbers numbersOf(const py::object& given, const Corner& origin) {
 
 /// A voxel of the array is active if it is not masked and differs from the background by more than
 /// the threshold.
+/// NaN and infinities are active.
 BrickInput brickOfArray(const Dense& dense, Coord corner, float background, float threshold) {
   BrickInput brick{corner, {}, {}};
   brick.values.fill(background);
@@ -140,8 +143,14 @@ BrickInput brickOfArray(const Dense& dense, Coord corner, float background, floa
     const std::size_t place = dense.placeOf(voxel);
     if (dense.masked != nullptr && dense.masked[place]) continue;
     const float value = dense.values[place];
-    if (!std::isfinite(value))
-      throw BadInput("the value of voxel " + toString(voxel) + " is not finite");
+    if (!std::isfinite(value)) {
+      if (!dense.keepsNonFinite)
+        throw BadInput("the value of voxel " + toString(voxel) +
+                       " is not finite; nonfinite='keep' keeps such values");
+      brick.values[i] = std::isnan(value) ? std::numeric_limits<float>::quiet_NaN() : value;
+      brick.active.set(i);
+      continue;
+    }
     if (!(std::abs(value - background) > threshold)) continue;
     brick.values[i] = value;
     brick.active.set(i);
@@ -171,6 +180,7 @@ struct ArrayOptions {
   double voxelSize;
   std::string name;
   bool levelSet;
+  NonFinite nonFinite;
 };
 
 /// The number of active voxels whose float differs from the number of the array.
@@ -197,7 +207,8 @@ Volume fromNumpy(const py::object& array, const ArrayOptions& options) {
   const Dense dense{.values = numbers.values.data(),
                     .masked = numbers.masked ? numbers.masked->data() : nullptr,
                     .side = side,
-                    .box = {first, first + (side - Coord{1, 1, 1})}};
+                    .box = {first, first + (side - Coord{1, 1, 1})},
+                    .keepsNonFinite = options.nonFinite == NonFinite::kKeep};
   const py::gil_scoped_release release;
   auto grid = std::make_shared<VolumeGrid>();
   grid->descriptor.name = options.name;
@@ -256,11 +267,17 @@ std::size_t firstOfNumbers(const std::filesystem::path& path) {
 constexpr const char* kWayOut =
     "; the program vdb2esvr carries such a grid of a .vdb file unchanged (--keep NAME)";
 
-Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
+constexpr const char* kKeepsThem = "; nonfinite='keep' keeps such values";
+
+Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name,
+               NonFinite nonFinite) {
+  const ReadOptions read{.nonFinite = nonFinite};
   return interruptible([&] {
     try {
       return Volume{std::make_shared<const VolumeGrid>(
-          name ? readGrid(path, *name) : readGrid(path, firstOfNumbers(path)))};
+          name ? readGrid(path, *name, read) : readGrid(path, firstOfNumbers(path), read))};
+    } catch (const NotFinite& error) {
+      throw BadInput(error.what() + std::string(kKeepsThem) + kWayOut);
     } catch (const CannotConvert& error) {
       throw BadInput(error.what() + std::string(kWayOut));
     } catch (const MemoryExceeded& error) {
@@ -270,10 +287,15 @@ Volume fromVdb(const std::filesystem::path& path, const std::optional<std::strin
 }
 
 /// The only grid of a file, which may have no active voxel.
-Volume fromOnlyGrid(const std::filesystem::path& path) {
+Volume fromOnlyGrid(const std::filesystem::path& path, NonFinite nonFinite) {
   return interruptible([&] {
     constexpr std::size_t kOnly = 0;
-    return Volume{std::make_shared<const VolumeGrid>(readGrid(path, kOnly, {.allowEmpty = true}))};
+    try {
+      return Volume{std::make_shared<const VolumeGrid>(
+          readGrid(path, kOnly, {.nonFinite = nonFinite, .allowEmpty = true}))};
+    } catch (const NotFinite& error) {
+      throw BadInput(error.what() + std::string(kKeepsThem));
+    }
   });
 }
 
@@ -284,7 +306,19 @@ void write(const Volume& self, const std::filesystem::path& path, const WriteOpt
   });
 }
 
+std::uint64_t nonFiniteCount(const SparseVolume& volume) {
+  std::uint64_t count = 0;
+  for (const float value : volume.values) count += !std::isfinite(value);
+  return count;
+}
+
 }  // namespace
+
+NonFinite nonFiniteOf(const std::string& word) {
+  if (word == "refuse") return NonFinite::kRefuse;
+  if (word == "keep") return NonFinite::kKeep;
+  throw UsageError("nonfinite is one of refuse, keep, not '" + word + "'");
+}
 
 void addVolume(py::module_& module) {
   py::class_<Volume>(module, "Volume",
@@ -292,25 +326,33 @@ void addVolume(py::module_& module) {
       .def_static(
           "from_numpy",
           [](const py::object& array, float background, const Corner& origin, float threshold,
-             double voxelSize, const std::string& name, bool levelSet) {
-            return fromNumpy(array, {background, threshold, origin, voxelSize, name, levelSet});
+             double voxelSize, const std::string& name, bool levelSet,
+             const std::string& nonFinite) {
+            return fromNumpy(array, {background, threshold, origin, voxelSize, name, levelSet,
+                                     nonFiniteOf(nonFinite)});
           },
           py::arg("array"), py::kw_only(), py::arg("background") = 0.0f,
           py::arg("origin") = Corner{}, py::arg("threshold") = 0.0f, py::arg("voxel_size") = 1.0,
           py::arg("name") = "density", py::arg("level_set") = false,
+          py::arg("nonfinite") = "refuse",
           "Makes a volume from an array of shape (nx, ny, nz), converted to float32.\n\n"
           "A voxel is active if it differs from the background by more than the threshold.\n"
           "Elements that a masked array hides are not active, whatever their values are.\n"
           "Integers that float32 does not have (2**24 + 1), numbers beyond its range, dates,\n"
           "records, text and complex numbers are refused. Volume.rounded_values counts active\n"
           "voxels whose double was rounded.\n"
-          "origin is the voxel of array[0, 0, 0], and voxel_size is in world units.")
+          "origin is the voxel of array[0, 0, 0], and voxel_size is in world units.\n"
+          "nonfinite is 'refuse', or 'keep': NaN and infinities are active voxels.")
       .def_static(
-          "from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
+          "from_vdb",
+          [](const std::filesystem::path& path, const std::optional<std::string>& name,
+             const std::string& nonFinite) { return fromVdb(path, name, nonFiniteOf(nonFinite)); },
+          py::arg("path"), py::arg("grid") = py::none(), py::kw_only(),
+          py::arg("nonfinite") = "refuse",
           "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default. It is named\n"
           "as for --grid of the programs: \"density[1]\" is the second grid of a name, \"vel.x\" "
           "a\n"
-          "component of vectors.")
+          "component of vectors. nonfinite is that of from_numpy.")
       .def("to_numpy", &toNumpy, py::arg("box") = py::none(),
            "The voxels of a box ((x0, y0, z0), (x1, y1, z1)), both inclusive, as float32 of shape\n"
            "(nx, ny, nz); by default those of Volume.box.")
@@ -322,7 +364,12 @@ void addVolume(py::module_& module) {
           py::arg("path"), py::kw_only(), py::arg("overwrite") = false,
           "Writes a .vdb or .nvdb file with this grid.")
       // For esvr/_openvdb.py.
-      .def_static("_from_only_grid", &fromOnlyGrid, py::arg("path"))
+      .def_static(
+          "_from_only_grid",
+          [](const std::filesystem::path& path, const std::string& nonFinite) {
+            return fromOnlyGrid(path, nonFiniteOf(nonFinite));
+          },
+          py::arg("path"), py::arg("nonfinite"))
       .def(
           "_save_as_float",
           [](const Volume& v, const std::filesystem::path& path) {
@@ -338,6 +385,9 @@ void addVolume(py::module_& module) {
       .def_property_readonly(
           "active_voxels", [](const Volume& v) { return activeVoxelCount(v.grid->volume); },
           "Number of active voxels.")
+      .def_property_readonly(
+          "nonfinite", [](const Volume& v) { return nonFiniteCount(v.grid->volume); },
+          "Number of active voxels that are NaN or infinite.")
       .def_readonly("rounded_values", &Volume::roundedValues,
                     "Number of active voxels of from_numpy whose float32 differs from the element.")
       .def_property_readonly(
@@ -355,7 +405,8 @@ void addVolume(py::module_& module) {
             const ValueRange range = activeRange(v.grid->volume);
             return std::pair(range.min, range.max);
           },
-          "The smallest and the largest active value; None if there is none. Their difference is "
+          "The smallest and the largest finite active value; None if there is none. Their "
+          "difference is "
           "the\n"
           "range of which --max-error takes a percentage.")
       .def_property_readonly(
