@@ -17,6 +17,7 @@
 #include "esvr/grid.h"
 #include "esvr/metrics.h"
 #include "esvr/quantised.h"
+#include "format/encode.h"
 #include "format/non_finite_section.h"
 
 namespace esvr::encode {

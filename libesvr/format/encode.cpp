@@ -349,6 +349,13 @@ SectionWriter collect(const EsvrFile& file, const FrameContext& context) {
 
 namespace format {
 
+std::uint64_t bytesOfNonFinite(const StoredGrid& grid) {
+  if (!grid.nonFiniteVoxels) return 0;
+  SectionWriter out;
+  out.addRaw({SectionKind::kNonFinite, 0}, kRequired, putNonFinite(grid, nullptr));
+  return out.bytesUnshared();
+}
+
 SectionWriter sectionsOf(const EsvrFile& file) {
   return collect(file, {Differences(file.grids.size())});
 }

@@ -11,7 +11,6 @@
 
 #include "core/geometry.h"
 #include "esvr/error.h"
-#include "format/section_writer.h"
 #include "format/voxel_section.h"
 
 namespace esvr::format {
@@ -164,13 +163,6 @@ std::optional<Fault> nonFiniteFaultOf(const StoredGrid& grid) {
 std::vector<std::byte> putNonFinite(const StoredGrid& grid, const StoredGrid* before) {
   if (before && before->nonFiniteVoxels == grid.nonFiniteVoxels) return {};
   return putVoxels(*grid.nonFiniteVoxels);
-}
-
-std::uint64_t bytesOfNonFinite(const StoredGrid& grid) {
-  if (!grid.nonFiniteVoxels) return 0;
-  SectionWriter out;
-  out.addRaw({SectionKind::kNonFinite, 0}, kRequired, putNonFinite(grid, nullptr));
-  return out.bytesUnshared();
 }
 
 void getNonFinite(SectionReader& sections, std::uint32_t g, const EsvrFile* previous,

@@ -29,9 +29,6 @@ namespace esvr::format {
 ///                content is empty
 [[nodiscard]] std::vector<std::byte> putNonFinite(const StoredGrid& grid, const StoredGrid* before);
 
-/// Largest number of bytes that the section adds to a file; 0 if the grid needs none.
-[[nodiscard]] std::uint64_t bytesOfNonFinite(const StoredGrid& grid);
-
 /// Reads the section of grid `g`, if its record says that there is one.
 /// \param previous  the frame before; null: the file stands alone
 /// \throws BadInput  the section is missing or damaged, or it refers to a frame before that has other voxels

@@ -12,7 +12,6 @@
 #include "format/decode.h"
 #include "format/encode.h"
 #include "format/frame_table.h"
-#include "format/non_finite_section.h"
 #include "format/sequence_index.h"
 
 namespace esvr {

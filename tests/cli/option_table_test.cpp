@@ -84,6 +84,7 @@ Table esvr2vdbTests() {
   return {{"--bbox", "Esvr2Vdb.writesAPartOfTheVoxelsWithoutReadingTheRest"},
           {"--box", "Esvr2VdbOption.boxIsWherePsnrIsTaken"},
           {"--check", "Esvr2Vdb.checksAFile"},
+          {"--coarsen", "CoarserGrid.hasTheAveragesAndTheTransform"},
           {"--colors", "SplatFiles.HaveTheColorsAndTheDensityThatAreAskedFor"},
           {"--density-scale", "SplatFiles.HaveTheColorsAndTheDensityThatAreAskedFor"},
           {"--force", "Esvr2Vdb.keepsAnExistingFileUnlessForced"},

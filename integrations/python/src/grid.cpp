@@ -16,6 +16,7 @@
 #include "esvr/field.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
+#include "esvr/resolution.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -141,24 +142,42 @@ py::object matrixOf(const Transform& transform) {
   return matrix;
 }
 
+double factorOf(const Transform& transform, const SavedResolution& wish) {
+  if (wish.coarsen && wish.voxelSize) throw UsageError("coarsen and voxel_size exclude each other");
+  if (wish.coarsen && !(*wish.coarsen >= 1.0)) throw UsageError("coarsen must be 1 or above");
+  if (wish.voxelSize && !(*wish.voxelSize > 0.0)) throw UsageError("voxel_size must be above 0");
+  return wish.voxelSize ? factorFor(transform, *wish.voxelSize) : wish.coarsen.value_or(1.0);
+}
+
 Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
-               const std::optional<std::uint64_t>& maxMemory) {
+               const std::optional<std::uint64_t>& maxMemory, const SavedResolution& resolution) {
   DecodeOptions options{.maxBytes = memoryLimit(maxMemory)};
   if (box) options.box = boxOf(*box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
   return interruptible([&] {
-    return Volume{std::make_shared<const VolumeGrid>(
-        VolumeGrid{grid.grid->descriptor, decodeGrid(*grid.grid, options)})};
+    return Volume{std::make_shared<const VolumeGrid>(decodeAtResolution(
+        *grid.grid, factorOf(grid.grid->descriptor.transform, resolution), options))};
   });
 }
 
 void addGrid(py::module_& module) {
   addEllipsoids(module);
   py::class_<Grid>(module, "Grid", "A grid of an .esvr file: a sum of ellipsoids, or voxels.")
-      .def("to_volume", &decoded, py::arg("box") = py::none(), py::kw_only(),
-           py::arg("max_memory") = py::none(),
-           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
-           "max_memory is that of esvr.read.")
+      .def(
+          "to_volume",
+          [](const Grid& grid, const std::optional<PlainBox>& box,
+             const std::optional<std::uint64_t>& maxMemory, std::optional<double> coarsen,
+             std::optional<double> voxelSize) {
+            return decoded(grid, box, maxMemory, {coarsen, voxelSize});
+          },
+          py::arg("box") = py::none(), py::kw_only(), py::arg("max_memory") = py::none(),
+          py::arg("coarsen") = py::none(), py::arg("voxel_size") = py::none(),
+          "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
+          "max_memory is that of esvr.read. coarsen is a factor from 1 to 1024 by which the edges "
+          "of\n"
+          "voxels become longer, each with the average of what is in it; voxel_size is the length\n"
+          "of their shortest edge instead, in units of the world, and may be shorter than in the\n"
+          "source for ellipsoids. The box is in voxels of the source.")
       .def("evaluate", &evaluate, py::arg("points"),
            "The sum of the ellipsoids at points of shape (n, 3), in index coordinates: float32 of\n"
            "shape (n,). A fit constrains it at voxels only.")
@@ -365,6 +384,8 @@ File convertSource(const ConvertedSource& given, const ConvertOptions& options, 
   if (std::holds_alternative<PsnrGoal>(options.goal))  // a preset is as good as the grids allow
     for (const GridConversion& grid : made.grids) requirePsnr(grid.conversion);
   return {std::make_shared<const EsvrFile>(std::move(made.file))};
+} catch (const NotFinite& error) {
+  throw BadInput(error.what() + std::string("; nonfinite='keep' stores where they are"));
 }
 
 /// Warns of what a grid without loss does not hold.
@@ -384,8 +405,6 @@ constexpr const char* kConvertText =
     "grids of equal voxels once, vectors, grids that are carried unchanged, and voxels that refer "
     "to\n"
     "those of a grid that is like them. size is that of the file. ";
-} catch (const NotFinite& error) {
-  throw BadInput(error.what() + std::string("; nonfinite='keep' stores where they are"));
 
 constexpr const char* kGoalText =
     "One of the goals may be given:\n\n"
@@ -405,6 +424,9 @@ constexpr const char* kGoalText =
     "tone: the scale of the tone curve; None: it is chosen where the measure is what is seen; 0: "
     "none.\n"
     "effort: how long the conversion may take, from 1 to 9.\n"
+    "nonfinite: 'refuse' NaN and infinite voxels, or 'keep' them: they come back where they were, "
+    "and\n"
+    "the goal and all errors are those of the other voxels.\n"
     "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. device:\n"
     "'auto', 'cpu', 'cuda' or 'cuda:N'. progress: is called with the share of the running fit "
     "that\n"
@@ -424,9 +446,6 @@ void defineConversion(py::module_& module, const char* name, const char* source,
                     std::optional<double> picturePsnr, std::optional<double> maxError,
                     std::optional<double> maxRelativeError, std::optional<double> relativeFloor,
                     std::optional<std::uint64_t> size, std::optional<std::size_t> count,
-    "nonfinite: 'refuse' NaN and infinite voxels, or 'keep' them: they come back where they were, "
-    "and\n"
-    "the goal and all errors are those of the other voxels.\n"
                     bool lossless, const std::string& preset, const std::string& measure,
                     std::optional<float> tone, int effort, const std::string& representation,
                     const std::string& storage, const std::string& nonFinite,
