@@ -269,9 +269,11 @@ class Averager {
 
 /// Bricks of the source, and coarse ones, that are in memory at the same time: 4 and 3 MB.
 constexpr std::size_t kBricksAtOnce = 2048, kCoarseAtOnce = 256;
-constexpr double kBytesAtOnce =
-    kBricksAtOnce * (kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord)) +
-    kCoarseAtOnce * double(sizeof(Sums));
+double bytesAtOnce(std::size_t bricks, std::size_t coarse) {
+  return double(std::min(bricks, kBricksAtOnce)) *
+             (kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord)) +
+         double(std::min(coarse, kCoarseAtOnce)) * double(sizeof(Sums));
+}
 /// Of a coarse brick in the result. It is there twice for a moment.
 constexpr double kBytesOfCoarse = 2.0 * sizeof(BrickInput);
 
@@ -321,8 +323,9 @@ SparseVolume averaged(const StoredGrid& grid, const AverageRule& rule,
   if (rule.isSigned) return averagedSurface(grid, rule, options);
   std::vector<Coord> bricks = format::decodedBricks(grid, options);
   const std::vector<Coord> coarse = coarseBricks(bricks, rule.factor);
-  requireWithinMemory(double(coarse.size()) * kBytesOfCoarse + kBytesAtOnce, options.maxBytes,
-                      "grid '" + shownName(grid.descriptor.name) + "' at this resolution");
+  requireWithinMemory(
+      double(coarse.size()) * kBytesOfCoarse + bytesAtOnce(bricks.size(), coarse.size()),
+      options.maxBytes, "grid '" + shownName(grid.descriptor.name) + "' at this resolution");
   for (Coord& brick : bricks) brick = brickOf(brick);
   std::vector<BrickInput> made;
   for (std::size_t first = 0; first < coarse.size(); first += kCoarseAtOnce) {
@@ -429,7 +432,8 @@ ResolutionBytes bytesAtResolution(const StoredGrid& grid, double factor,
   const std::size_t count = factor == 1.0 ? bricks.size() : coarseBricks(bricks, factor).size();
   const double result =
       double(count) * (kBrickVoxels * sizeof(float) + sizeof(BrickMask) + sizeof(Coord));
-  return {std::uint64_t(result), factor > 1.0 ? std::uint64_t(kBytesAtOnce) : 0};
+  return {std::uint64_t(result),
+          factor > 1.0 ? std::uint64_t(bytesAtOnce(bricks.size(), count)) : 0};
 }
 
 }  // namespace esvr
