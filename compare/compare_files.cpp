@@ -491,8 +491,15 @@ class Comparison {
   /// than all other figures.
   void addMeshDistance(CheckedGrid& grid, const VolumeGrid& a, const VolumeGrid& b) const {
     const auto figure = std::size_t(FigureId::kMeshDistance);
-    if (options_.limits[figure] && a.descriptor.gridClass == GridClass::kLevelSet)
+    if (!options_.limits[figure] || a.descriptor.gridClass != GridClass::kLevelSet) return;
+    if (grid.metrics.nonFinite == 0) {
       grid.figures[figure] = meshDistance(a, b).voxels;
+      return;
+    }
+    VolumeGrid c = a, d = b;  // no surface passes where there is no distance
+    dropNonFinite(c.volume);
+    dropNonFinite(d.volume);
+    grid.figures[figure] = meshDistance(c, d).voxels;
   }
 
   void addRelativeError(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b) const {

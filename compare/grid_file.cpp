@@ -116,7 +116,8 @@ std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
 }
 
 VolumeGrid GridFile::read(std::size_t g) const {
-  const ReadOptions options{.allowEmpty = true,
+  const ReadOptions options{.nonFinite = NonFinite::kKeep,
+                            .allowEmpty = true,
                             .maxBytes = memory_.maxBytes,
                             .memory = memory_.voxels,
                             .volumes = kVolumes,
@@ -132,7 +133,8 @@ VolumeGrid GridFile::read(std::size_t g) const {
 }
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
-  const ReadOptions options{.maxBytes = memory_.maxBytes,
+  const ReadOptions options{.nonFinite = NonFinite::kKeep,
+                            .maxBytes = memory_.maxBytes,
                             .memory = memory_.voxels,
                             .volumes = kVolumes,
                             .directory = directory_};

@@ -40,6 +40,10 @@ VolumeGrid readReference(const GridFile& file, std::size_t place) {
   if (activeVoxelCount(reference.volume) == 0)
     throw BadInput(file.path().string() + ": grid \"" + file.grids()[place].uniqueName +
                    "\" has no active voxel");
+  if (hasNonFinite(reference.volume))
+    throw BadInput(file.path().string() + ": grid \"" + file.grids()[place].uniqueName +
+                   "\" has NaN or infinite voxels, which other formats cannot be compared with; "
+                   "'esvr-compare check' compares such grids");
   return reference;
 }
 

@@ -21,7 +21,9 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/metrics.h"
+#include "esvr/resolution.h"
 #include "esvr/vdb_io.h"
+#include "esvr2vdb/resolution.h"
 #include "esvr2vdb/splats.h"
 #include "programs/files.h"
 #include "programs/messages.h"
@@ -69,7 +71,9 @@ struct ComparedGrid {
 };
 
 ReadOptions readingOf(const Options& options) {
-  return {.maxBytes = options.memory.maxBytes, .memory = options.memory.voxels};
+  return {.nonFinite = NonFinite::kKeep,
+          .maxBytes = options.memory.maxBytes,
+          .memory = options.memory.voxels};
 }
 
 /// The two files of a comparison.
@@ -170,6 +174,8 @@ bool writesNano(const Options& options) { return options.output.extension() == "
 /// Why the output cannot hold a grid; empty if it can.
 std::string whyNot(const EsvrFile& file, const GridOfFile& grid, const Options& options) {
   if (!grid.isCarried) return "";
+  if (changesResolution(options))
+    return "--coarsen and --voxel-size cannot resample a carried grid";
   if (!readsAll(options)) return "--lod, --max-ellipsoids and --bbox cannot cut a carried grid";
   return writesNano(options) ? whyNotNano(&file.carried[grid.index]) : "";
 }
@@ -236,20 +242,20 @@ StoredGrid wantedPart(const StoredGrid& grid, const Options& options) {
 }
 
 VolumeGrid decoded(const StoredGrid& grid, const Options& options, const DecodeOptions& decode) {
-  VolumeGrid result;
-  result.descriptor = grid.descriptor;
-  result.volume =
-      isCut(options) ? decodeGrid(wantedPart(grid, options), decode) : decodeGrid(grid, decode);
-  return result;
+  const double factor = factorOf(options.resolution, grid.descriptor);
+  return isCut(options) ? decodeAtResolution(wantedPart(grid, options), factor, decode)
+                        : decodeAtResolution(grid, factor, decode);
 }
 
 VectorGrid decoded(const EsvrFile& file, const StoredVector& vector, const Options& options,
                    const DecodeOptions& decode) {
   const StoredComponents components = componentsOf(file, vector);
-  if (!isCut(options)) return decodeVector(vector.name, components, decode);
+  const double factor = factorOf(options.resolution, components.front().descriptor);
+  if (!isCut(options)) return decodeVectorAtResolution(vector.name, components, factor, decode);
   std::vector<StoredGrid> parts;
   for (const StoredGrid& component : components) parts.push_back(wantedPart(component, options));
-  return decodeVector(vector.name, std::span(parts).first<kComponents>(), decode);
+  return decodeVectorAtResolution(vector.name, std::span(parts).first<kComponents>(), factor,
+                                  decode);
 }
 
 /// Bytes of a volume in memory.
@@ -290,13 +296,28 @@ DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options&
   return decoded(file.grids[grid.index], options, decode);
 }
 
+/// The grids that are not carried, and the components of those of vectors.
+std::vector<const StoredGrid*> storedGrids(const EsvrFile& file,
+                                           const std::vector<ListedGrid>& chosen) {
+  std::vector<const StoredGrid*> grids;
+  for (const auto& [grid, name, place] : chosen) {
+    if (grid.isCarried) continue;
+    const std::size_t first = grid.isVector ? file.vectors[grid.index].first : grid.index;
+    for (std::size_t g = first; g < first + (grid.isVector ? kComponents : 1); ++g)
+      grids.push_back(&file.grids[g]);
+  }
+  return grids;
+}
+
 /// The grids that are not carried, in order.
 std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
-                                   const Options& options, const cli::Log& log) {
+                                   const Options& given, const cli::Log& log) {
+  Options options = given;
   std::vector<DecodedGrid> grids;
   DecodeOptions decode = options.decode;
   decode.maxBytes = options.memory.maxBytes - std::min(options.memory.maxBytes, contentBytes(file));
   decode.memory = options.memory.voxels;
+  options.resolution = resolved(options.resolution, storedGrids(file, chosen), decode, log);
   for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
     grids.push_back(decoded(file, named.grid, options, decode));
@@ -336,9 +357,8 @@ std::optional<std::array<float, 2>> rangeIn(const Options& options, const VdbSum
                                             std::size_t place) {
   const GridSummary& grid = file.grids[place];
   if (grid.activeVoxels == 0 || !(grid.isScalar || grid.isVector)) return std::nullopt;
-  const ReadOptions read{.maxBytes = options.memory.maxBytes,
-                         .memory = options.memory.voxels,
-                         .directory = file.directory};
+  ReadOptions read = readingOf(options);
+  read.directory = file.directory;
   const VolumeGrid voxels = grid.isVector ? readComponent(*options.reference, place, 0, read)
                                           : readGrid(*options.reference, place, read);
   const ValueRange range = activeRange(voxels.volume);

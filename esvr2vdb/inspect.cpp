@@ -278,15 +278,35 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const ListedGrid& 
           "-"};
 }
 
+/// The number of voxels of a grid that are NaN or infinite, over the components of vectors.
+std::uint64_t nonFiniteIn(const Listing& listing, const GridOfFile& grid) {
+  if (grid.isCarried) return 0;
+  const std::size_t first = grid.isVector ? listing.file.vectors[grid.index].first : grid.index;
+  std::uint64_t count = 0;
+  for (std::size_t g = first; g < first + (grid.isVector ? kComponents : 1); ++g)
+    count += listing.file.grids[g].nonFinite.total();
+  return count;
+}
+
+/// The last column is there only if a grid has voxels that are not finite.
 void printGrids(const Listing& listing) {
-  cli::Table table({"grid", "class", "values", "active voxels", "ellipsoids", "kernel, kappa",
-                    "tone", "active by", "bytes", "bytes each"});
+  std::vector<std::string> titles{"grid",       "class",         "values", "active voxels",
+                                  "ellipsoids", "kernel, kappa", "tone",   "active by",
+                                  "bytes",      "bytes each"};
+  const bool anyNonFinite = std::ranges::any_of(
+      listing.grids, [&](const ListedGrid& grid) { return nonFiniteIn(listing, grid.grid) > 0; });
+  if (anyNonFinite) titles.emplace_back("not finite");
+  cli::Table table(std::move(titles));
+  const auto add = [&](std::vector<std::string> row, const GridOfFile& grid) {
+    if (anyNonFinite) row.push_back(std::to_string(nonFiniteIn(listing, grid)));
+    table.add(std::move(row));
+  };
   std::size_t place = listing.grids.size();
   for (const ListedGrid& part : listing.parts) {
     const ListedGrid& grid = listing.grids[part.place];
-    if (grid.grid.isVector && part.place != place) table.add(rowOfVector(listing, grid));
+    if (grid.grid.isVector && part.place != place) add(rowOfVector(listing, grid), grid.grid);
     place = part.place;
-    table.add(part.grid.isCarried ? rowOfCarried(listing, part) : rowOfStored(listing, part));
+    add(part.grid.isCarried ? rowOfCarried(listing, part) : rowOfStored(listing, part), part.grid);
   }
   table.print(std::cout);
   GridNotes notes;
@@ -365,6 +385,9 @@ void printStoredDetails(const Listing& listing, const std::string& name, const S
             << cli::shortNumber(grid.valueMin) << " to " << cli::shortNumber(grid.valueMax) << ", "
             << cli::activityOf(grid) << ", active box " << cli::textOf(grid.activeBox)
             << ", chunks " << grid.field.chunks.size();
+  if (grid.nonFinite.total() > 0)
+    std::cout << ", " << cli::textOf(grid.nonFinite) << " in "
+              << grid.nonFiniteVoxels->bricks.size() << " bricks";
   if (const std::string reference = referenceOf(listing, grid); !reference.empty())
     std::cout << ", voxels refer to " << cli::printable(reference);
   std::cout << '\n';

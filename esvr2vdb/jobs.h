@@ -30,6 +30,14 @@ struct SplatWish {
   cli::SplatInput read;
 };
 
+/// The size of the voxels that are written.
+struct Resolution {
+  double factor = 1.0;  ///< of the edges of the source's voxels
+  std::optional<double>
+      voxelSize{};      ///< their shortest edge in units of the world, instead of `factor`
+  bool isAuto = false;  ///< the grids fit into the memory
+};
+
 struct Options {
   Job job = Job::kConvert;
   std::filesystem::path input, output;
@@ -38,7 +46,8 @@ struct Options {
   std::optional<cli::Sequence> sequence;
   std::vector<std::string> grids;  ///< names of the grids; empty: all
   DecodeOptions decode;
-  ReadPart part;                             ///< the part of the file that is read
+  ReadPart part;  ///< the part of the file that is read
+  Resolution resolution;
   std::optional<std::size_t> maxEllipsoids;  ///< keep those of each grid with the largest weight
   WriteOptions write;
   SplatWish splats;

@@ -5,6 +5,7 @@
 
 #include "esvr/transfer_function.h"
 #include "esvr2vdb/jobs.h"
+#include "esvr2vdb/resolution.h"
 #include "esvr2vdb/splats.h"
 
 #include "programs/command_line.h"
@@ -78,6 +79,7 @@ cli::ProgramText programText() {
           "  esvr2vdb smoke.esvr back.vdb --reference smoke.vdb   # also print the errors\n"
           "  esvr2vdb smoke.esvr density.nvdb -g density\n"
           "  esvr2vdb smoke.esvr coarse.vdb --lod 1               # a preview\n"
+          "  esvr2vdb smoke.esvr half.vdb --coarsen 2             # averages of 2 x 2 x 2 voxels\n"
           "  esvr2vdb smoke.esvr part.vdb --bbox 0,0,0,63,63,63   # a part of the voxels\n"
           "  esvr2vdb smoke.esvr 'back.####.vdb' --frames 10-20   # frames of a sequence\n"
           "  esvr2vdb smoke.esvr smoke.ply --colors 0.9,0.9,0.9   # splats for viewers\n"
@@ -108,6 +110,9 @@ cli::CommandLine commandLine() {
     ("bbox", value<std::string>()->value_name("BOX"),
      "write only the voxels of the box x0,y0,z0,x1,y1,z1; ellipsoids that cannot reach the box are "
      "not read")
+    ("coarsen", value<std::string>()->value_name("F"),
+     "write voxels that are 2, 4 or 8 times as large along each axis and have the average of those in them; auto: as "
+     "much as --max-memory needs")
     ("half", value<std::string>()->value_name("W")->default_value("auto"),
      "save the values of a .vdb as half floats: on, off, or auto (as the source did)")
     ("no-tiles", bool_switch(), "write leaves whose voxels are all equal as leaves, not as tiles")
@@ -124,11 +129,16 @@ cli::CommandLine commandLine() {
      "the world)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
-  cli::addSplatInput(line.options());
+  cli::addSplatInput(line.options(),
+                     "side of a voxel in units of the world: of a grid made of splats (default: "
+                     "1/256 of the longest "
+                     "side of the splats' box), or of grids of IN.esvr, which are averaged or, if "
+                     "they are ellipsoids, "
+                     "evaluated between the voxels (default: as in the source)");
   cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
-  line.mainOptions({"list", "check", "grid", "lod", "bbox", "reference", "colors", "voxel-size",
-                    "force", "frames"});
+  line.mainOptions({"list", "check", "grid", "lod", "bbox", "coarsen", "reference", "colors",
+                    "voxel-size", "force", "frames"});
   return line;
 }
 
@@ -136,8 +146,9 @@ Job jobOf(const Arguments& a) {
   const bool list = a.get<bool>("list"), check = a.get<bool>("check");
   if (list && check) throw UsageError("--list and --check are two jobs; ask for one");
   if (!list && !check) return Job::kConvert;
-  for (const char* option : {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox",
-                             "reference", "box", "frames", "missing", "on-error"})
+  for (const char* option :
+       {"output", "grid", "threshold", "lod", "max-ellipsoids", "bbox", "coarsen", "voxel-size",
+        "reference", "box", "frames", "missing", "on-error"})
     if (a.has(option))
       throw UsageError(std::string(list ? "--list" : "--check") + " takes IN only, no " + option);
   return list ? Job::kList : Job::kCheck;
@@ -191,20 +202,22 @@ void refuseOptions(const Arguments& a, const std::string& files,
 void readSplats(const Arguments& a, Options& options) {
   const bool isRead = cli::isSplatFile(options.input), isWritten = writesSplats(options);
   if (!isRead && !isWritten)
-    refuseOptions(a, "files without splats",
-                  {"colors", "kind", "voxel-size", "density-scale", "up"});
+    refuseOptions(a, "files without splats", {"colors", "kind", "density-scale", "up"});
   if (isRead && isWritten) throw UsageError("splats are not converted to splats");
   if (isRead)
     refuseOptions(a, "splats in the input",
-                  {"grid", "threshold", "lod", "max-ellipsoids", "bbox", "reference", "box",
-                   "colors", "kind"});
+                  {"grid", "threshold", "lod", "max-ellipsoids", "bbox", "coarsen", "reference",
+                   "box", "colors", "kind"});
   if (isWritten)
     refuseOptions(a, "splats in the output",
-                  {"threshold", "reference", "box", "half", "voxel-size"});
+                  {"threshold", "reference", "box", "half", "coarsen", "voxel-size"});
   if (options.output.extension() == ".usda") refuseOptions(a, "USD", {"kind"});
   if (options.sequence && (isRead || isWritten))
     throw UsageError("splats are those of a single frame; name a file of one frame");
   options.splats.read = cli::splatInputOf(a);
+  if (!isRead)
+    options.resolution =
+        resolutionOf(a.find<std::string>("coarsen"), options.splats.read.voxelSize);
   options.splats.made = {.form = cli::choose<SplatForm>(
                              "kind", a.get<std::string>("kind"),
                              {{"viewer", SplatForm::kPly}, {"mitsuba", SplatForm::kMitsuba}}),
@@ -233,6 +246,11 @@ void readConversion(const Arguments& a, Options& options) {
     throw UsageError("--reference needs a pattern for the number of a frame, because '" +
                      options.input.string() + "' is a sequence");
   readSplats(a, options);
+  if (options.sequence && options.resolution.isAuto)
+    throw UsageError("--coarsen auto may give frames voxels of several sizes; name a factor");
+  if (options.reference && changesResolution(options))
+    throw UsageError(
+        "--reference compares voxels of one size; leave out --coarsen and --voxel-size");
 }
 
 /// \return nothing if --help or --version was printed

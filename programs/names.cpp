@@ -38,6 +38,17 @@ std::string activityOf(const StoredGrid& grid) {
   return "threshold " + shortNumber(grid.activeThreshold);
 }
 
+std::string textOf(const NonFiniteCounts& counts) {
+  std::string text;
+  const auto add = [&](std::uint64_t count, const char* kind) {
+    if (count > 0) text += (text.empty() ? "" : " and ") + std::to_string(count) + " " + kind;
+  };
+  add(counts.nan, "NaN");
+  add(counts.plusInfinity, "+infinity");
+  add(counts.minusInfinity, "-infinity");
+  return text + (counts.total() == 1 ? " voxel" : " voxels");
+}
+
 std::string valuesOf(const GridSummary& grid) {
   return grid.savedAsHalf ? grid.valueType + " as half" : grid.valueType;
 }

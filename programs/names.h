@@ -25,6 +25,9 @@ namespace esvr::cli {
 /// How the active voxels of a grid of ellipsoids are found: "threshold 0.01" or "a mask".
 [[nodiscard]] std::string activityOf(const StoredGrid& grid);
 
+/// The voxels of a grid that are not finite: "12 NaN and 1 -infinity voxels".
+[[nodiscard]] std::string textOf(const NonFiniteCounts& counts);
+
 /// The type of the values of a grid of a .vdb file: "int32", "vec3s as half".
 [[nodiscard]] std::string valuesOf(const GridSummary& grid);
 /// The number of its active voxels; "-" if the grid is of a type that is not counted, and the

@@ -36,12 +36,11 @@ void tellLeftOut(const SplatFile& file, const Log& log) {
 
 }  // namespace
 
-void addSplatInput(po::options_description& options) {
+void addSplatInput(po::options_description& options, const char* voxelSize) {
   // clang-format off
   options.add_options()
     ("voxel-size", po::value<double>()->value_name("S"),
-     "side of a voxel of a grid made of splats, in units of the world (default: 1/256 of the longest side of the "
-     "splats' box)")
+     voxelSize)
     ("density-scale", po::value<double>()->value_name("D"),
      "extinction of a density of 1 over a unit of the world, of splats that are written or read")
     ("up", po::value<std::string>()->value_name("A")->default_value("y"),

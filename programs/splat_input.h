@@ -19,7 +19,10 @@ struct SplatInput {
 };
 
 /// Adds --voxel-size, --density-scale and --up.
-void addSplatInput(po::options_description& options);
+void addSplatInput(po::options_description& options,
+                   const char* voxelSize =
+                       "side of a voxel of a grid made of splats, in units of the world (default: "
+                       "1/256 of the longest side of the splats' box)");
 
 /// \throws UsageError  an option is invalid
 [[nodiscard]] SplatInput splatInputOf(const Arguments& arguments);

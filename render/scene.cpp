@@ -78,8 +78,11 @@ Scene propertiesOf(const StoredGrid& grid, const std::string& name) {
 Scene complete(StoredGrid grid, const std::string& name, const cli::HostMemory& memory) {
   Scene scene = propertiesOf(grid, name);
   if (grid.voxels) {
-    VolumeGrid decoded{grid.descriptor,
-                       decodeGrid(grid, {.maxBytes = memory.maxBytes, .memory = memory.voxels}), 0};
+    VolumeGrid decoded{
+        grid.descriptor,
+        decodeGrid(grid,
+                   {.maxBytes = memory.maxBytes, .memory = memory.voxels, .keepsNonFinite = false}),
+        0};
     scene.medianDepth = lookBasis(decoded.descriptor, decoded.volume).medianDepth;
     scene.content = std::move(decoded);
   } else {
@@ -209,8 +212,10 @@ class GridsOfVdb {
   }
 
   [[nodiscard]] Scene scene(const NamedGrid& named, bool allowEmpty = false) const {
-    const ReadOptions options{
-        .allowEmpty = allowEmpty, .maxBytes = from_.memory.maxBytes, .memory = from_.memory.voxels};
+    const ReadOptions options{.nonFinite = NonFinite::kBackground,
+                              .allowEmpty = allowEmpty,
+                              .maxBytes = from_.memory.maxBytes,
+                              .memory = from_.memory.voxels};
     VolumeGrid grid = named.component
                           ? readComponent(from_.path, named.place, *named.component, options)
                           : readGrid(from_.path, named.place, options);
@@ -315,7 +320,8 @@ SceneRenderer::SceneRenderer(const std::vector<Scene>& scenes, const DrawSetting
 DrawnGrid SceneRenderer::drawnGrid(const Scene& scene, const DrawSettings& s) {
   if (const auto* const grid = std::get_if<VolumeGrid>(&scene.content)) return &grid->volume;
   const StoredGrid& stored = *scene.encoded;
-  const DecodeOptions decoding{.maxBytes = s.memory.maxBytes, .memory = s.memory.voxels};
+  const DecodeOptions decoding{
+      .maxBytes = s.memory.maxBytes, .memory = s.memory.voxels, .keepsNonFinite = false};
   if (hasSum(scene)) {
     const Field& field = std::get<Field>(scene.content);
     if (!s.sums && liesFarApart(field, scene.box))

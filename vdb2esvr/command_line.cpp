@@ -114,6 +114,7 @@ cli::ProgramText programText() {
           "  vdb2esvr smoke.vdb smoke.esvr -g density --count 12000 --report fit.json\n"
           "  vdb2esvr frame.vdb frame.esvr --skip velocity       # all grids but one\n"
           "  vdb2esvr ct.vdb ct.esvr --max-error 0.5%            # every voxel within the bound\n"
+          "  vdb2esvr ocean.vdb ocean.esvr --nonfinite keep      # NaN comes back where it was\n"
           "  vdb2esvr big.vdb big.esvr --count 2000000 --max-vram 4GB --resume\n"
           "  vdb2esvr ct.vdb ct.esvr --seconds 30 --box 0,0,0,255,255,255\n"
           "  vdb2esvr 'smoke.####.vdb' 'smoke.####.esvr' --frames 1-100 --missing hold\n"
@@ -208,8 +209,8 @@ void addFileOptions(cli::po::options_description& options) {
      "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
      "--ratio")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
-     "refuse: fail on NaN or infinite voxels; zero, background or a number: replace them by 0, by the "
-     "background of the grid or by that number")
+     "refuse: fail on NaN or infinite voxels; keep: store where they are, so that they come back; zero, "
+     "background or a number: replace them by 0, by the background of the grid or by that number")
     ("report", value<std::string>()->value_name("FILE"),
      "write a JSON report to FILE, whose name ends in .json; '-' is stdout")
     ("resume", bool_switch(),

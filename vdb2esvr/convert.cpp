@@ -78,6 +78,12 @@ constexpr std::size_t kMaxMeshedVoxels = std::size_t{1} << 19;
 
 std::optional<SurfaceErrors> surfaceErrors(const VolumeGrid& source, const VolumeGrid& decoded) {
   if (!isNarrowBand(source.descriptor, source.volume)) return std::nullopt;
+  if (hasNonFinite(source.volume)) {  // no surface passes where there is no distance
+    VolumeGrid a = source, b = decoded;
+    dropNonFinite(a.volume);
+    dropNonFinite(b.volume);
+    return surfaceErrors(a, b);
+  }
   SurfaceErrors errors{compareSigns(source.volume, decoded.volume)};
   if (source.volume.values.size() <= kMaxMeshedVoxels)
     errors.distance = meshDistance(source, decoded);

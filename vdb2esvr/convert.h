@@ -37,8 +37,10 @@ template <class Body>
 auto sayingTheWayOut(const FittedGrid& grid, const Body& body) try {
   return body();
 } catch (const NotFinite& error) {
-  throw BadInput(error.what() + std::string("; --nonfinite zero replaces them by 0, and") +
-                 wayOut(grid.source));
+  throw BadInput(
+      error.what() +
+      std::string("; --nonfinite keep stores where they are, zero replaces them by 0, and") +
+      wayOut(grid.source));
 } catch (const CannotConvert& error) {
   throw BadInput(error.what() + std::string(";") + wayOut(grid.source));
 } catch (const MemoryExceeded& error) {

@@ -294,12 +294,17 @@ void requireRepresentation(const Arguments& a, const Options& options) {
 void readNonFinite(const Arguments& a, ReadOptions& read) {
   const auto text = a.get<std::string>("nonfinite");
   if (text == "refuse" || text == "error") return;
+  if (text == "keep") {
+    read.nonFinite = NonFinite::kKeep;
+    return;
+  }
   read.nonFinite = text == "background" ? NonFinite::kBackground : NonFinite::kValue;
   if (text == "zero" || text == "background") return;
   const auto value = cli::parseNumber(text);
   if (!value || !std::isfinite(float(*value)))
-    throw UsageError("--nonfinite must be refuse, zero, background or a number such as -1, not '" +
-                     text + "'");
+    throw UsageError(
+        "--nonfinite must be refuse, keep, zero, background or a number such as -1, not '" + text +
+        "'");
   read.nonFiniteValue = float(*value);
 }
 

@@ -170,7 +170,18 @@ Json inactiveOf(const InactiveValues& values) {
           {"nonfinite", values.nonFinite()}};
 }
 
-Json sourceOf(const ConvertedGrid& grid) {
+/// The voxels that are not finite and come back so; null if there is none.
+Json keptOf(const RunRecord& record, std::size_t g) {
+  const NonFiniteCounts& kept = record.grids[g].stored().nonFinite;
+  if (kept.total() == 0) return nullptr;
+  return {{"nan", kept.nan},
+          {"plus_infinity", kept.plusInfinity},
+          {"minus_infinity", kept.minusInfinity},
+          {"bytes", bytesOf(record.output, g, "non-finite voxels")}};
+}
+
+Json sourceOf(const RunRecord& record, std::size_t g) {
+  const ConvertedGrid& grid = record.grids[g];
   const StoredGrid& stored = grid.stored();
   return {{"class", className(stored.descriptor.gridClass)},
           {"value_type", cli::nameOf(stored.descriptor.valueType)},
@@ -181,6 +192,7 @@ Json sourceOf(const ConvertedGrid& grid) {
           {"bricks", grid.bricks},
           {"value_range", {stored.valueMin, stored.valueMax}},
           {"nonfinite_replaced", grid.nonFiniteReplaced},
+          {"nonfinite_kept", keptOf(record, g)},
           {"inactive_lost", inactiveOf(grid.inactive)}};
 }
 
@@ -355,7 +367,7 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"same_as", grid.twinOf ? Json(grid.sameAs) : Json(nullptr)},
           {"as_previous_frame", grid.asBefore},
           {"shared", sharedOf(grid)},
-          {"source", sourceOf(grid)},
+          {"source", sourceOf(record, g)},
           {"ellipsoids", grid.stored().field.ellipsoidCount()},
           {"bytes", cli::ownBytes(record.output, g)},
           {"sections", sectionsOf(record.output, g)},

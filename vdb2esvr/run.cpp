@@ -160,6 +160,10 @@ void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log&
     log.warning(
         "grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by " + replacement,
         std::to_string(grid.nonFiniteReplaced) + " voxels");
+  if (const NonFiniteCounts& kept = grid.stored().nonFinite; kept.total() > 0)
+    log.info("grid \"" + grid.uniqueName + "\": " + cli::textOf(kept) +
+             (kept.total() == 1 ? " is kept" : " are kept") +
+             ", and all errors are those of the others");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
     log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full",
                 std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +

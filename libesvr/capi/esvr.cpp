@@ -125,6 +125,7 @@ esvr_grid describe(const StoredGrid& grid) {
   d.ellipsoids = grid.field.ellipsoidCount();
   d.has_residual = grid.residual ? 1 : 0;
   d.tone = grid.tone.scale;
+  d.nonfinite = grid.nonFinite.total();
   return d;
 }
 

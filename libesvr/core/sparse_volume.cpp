@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <stdexcept>
@@ -220,10 +221,34 @@ ValueRange activeRange(const SparseVolume& volume) {
       overBricks(volume, ValueRange::none(), [&](std::size_t b, ValueRange& result) {
         const auto values = volume.brickValues(b);
         for (int i = 0; i < kBrickVoxels; ++i)
-          if (volume.active[b].test(i)) result.expand(values[i]);
+          if (volume.active[b].test(i) && std::isfinite(values[i])) result.expand(values[i]);
       });
-  if (range.min > range.max) throw BadInput("the grid has no active voxel");
-  return range;
+  if (range.min <= range.max) return range;
+  if (activeVoxelCount(volume) == 0) throw BadInput("the grid has no active voxel");
+  return {volume.background, volume.background};
+}
+
+bool hasNonFinite(const SparseVolume& volume) {
+  std::atomic<bool> found{false};
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    if (found.load(std::memory_order_relaxed)) return;
+    const auto values = volume.brickValues(b);
+    bool areFinite = true;
+    for (const float value : values) areFinite &= std::isfinite(value);
+    if (!areFinite) found.store(true, std::memory_order_relaxed);
+  });
+  return found;
+}
+
+void dropNonFinite(SparseVolume& volume) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (std::isfinite(values[std::size_t(v)])) continue;
+      values[std::size_t(v)] = volume.background;
+      volume.active[b].reset(v);
+    }
+  });
 }
 
 ValueSpan spanOf(const ValueRange& active, double background) {

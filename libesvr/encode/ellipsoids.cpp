@@ -28,13 +28,14 @@ const SparseVolume& valuesOf(const Job& job) {
   return job.judge ? job.judge->values() : job.input.source;
 }
 
-double boxGain(const SparseVolume& volume, const std::optional<Box>& given) {
-  const Box box = given.value_or(activeBox(volume));
+double boxGain(const SparseVolume& volume, const ConvertOptions& options) {
+  const Box box = options.fit.box.value_or(activeBox(volume));
   std::uint64_t active = 0;
-  for (std::size_t b = 0; given && b < volume.brickCount(); ++b)
+  for (std::size_t b = 0; options.fit.box && b < volume.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v)
       active += volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v));
-  if (!given) active = activeVoxelCount(volume);
+  if (!options.fit.box) active = activeVoxelCount(volume);
+  active -= std::min(active, options.filledVoxels);
   const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
   return 10.0 * std::log10(std::max(share, 1.0));
 }

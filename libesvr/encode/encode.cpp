@@ -15,6 +15,7 @@
 #include "core/add_seconds.h"
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
+#include "encode/non_finite.h"
 #include "encode/signs.h"
 #include "encode/tone.h"
 #include "encode/tuning.h"
@@ -306,9 +307,9 @@ class Converter {
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
     const Job job{job_.input, options, job_.judge, job_.scout};
-    const double psnr = seesPictures(job) ? presetPicturePsnr(options.fit.preset)
-                                          : presetPsnr(options.fit.preset) +
-                                                boxGain(job.input.source, options.fit.box);
+    const double psnr = seesPictures(job)
+                            ? presetPicturePsnr(options.fit.preset)
+                            : presetPsnr(options.fit.preset) + boxGain(job.input.source, options);
     return Choice(job, {.psnr = psnr}).forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
   }
   Conversion operator()(const SizeGoal& goal) const {
@@ -732,12 +733,23 @@ double presetSurfaceBound(Preset preset) {
 }
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
-  return encode::converted(input, options);
+  if (!hasNonFinite(input.source)) return encode::converted(input, options);
+  return encode::convertKeepingNonFinite(input, options, encode::converted);
 }
 
 PaperConversion convertByPaper(const ConvertInput& input, const PaperFitOptions& options,
                                const StorageOptions& storage) {
-  return encode::convertedByPaper(input, options, storage);
+  if (!hasNonFinite(input.source)) return encode::convertedByPaper(input, options, storage);
+  PaperRecord record;
+  ConvertOptions common;
+  common.fit.box = options.box;
+  Conversion made = encode::convertKeepingNonFinite(
+      input, common, [&](const ConvertInput& filled, const ConvertOptions&) {
+        PaperConversion byPaper = encode::convertedByPaper(filled, options, storage);
+        record = std::move(byPaper.record);
+        return std::move(byPaper.conversion);
+      });
+  return {std::move(made), std::move(record)};
 }
 
 }  // namespace esvr

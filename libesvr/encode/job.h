@@ -37,9 +37,9 @@ template <class Work>
 /// The values of the input, which are not those of a job with a tone curve.
 [[nodiscard]] const SparseVolume& valuesOf(const Job& job);
 
-/// dB that the PSNR over the box of a volume is above that over the active voxels in the box, if all errors
-/// are at these.
-[[nodiscard]] double boxGain(const SparseVolume& volume, const std::optional<Box>& box);
+/// dB that the PSNR over the box of a volume is above that over the active voxels in the box, without those that were
+/// filled, if all errors are at these.
+[[nodiscard]] double boxGain(const SparseVolume& volume, const ConvertOptions& options);
 
 /// True if the input of the job has the tones of a curve.
 [[nodiscard]] bool isToned(const Job& job);

@@ -64,7 +64,7 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
   mass_ = sumOfBricks(input.source, [](float value) { return value; });
   if (leavesTheMeasure(options.goal))
     valueGain_ = (tone.isOn() ? kTuning.picturesAboveValues : -kPicturesBelowValues) -
-                 boxGain(input.source, options.fit.box);
+                 boxGain(input.source, options);
 }
 
 /// Turns tones into values, as a reader of the grid does.

@@ -13,6 +13,7 @@
 #include "format/activity_sections.h"
 #include "format/ellipsoid_sections.h"
 #include "format/frame_table.h"
+#include "format/non_finite_section.h"
 #include "format/predicted_sections.h"
 #include "format/records.h"
 #include "format/section_reader.h"
@@ -38,7 +39,8 @@ bool encloses(const Box& outer, const Box& inner) {
 struct GridsOfFile {
   SectionReader& sections;
   GridRecords& records;
-  const ReadPart* part = nullptr;  ///< the part to read; null: all of it
+  const ReadPart* part = nullptr;      ///< the part to read; null: all of it
+  const EsvrFile* previous = nullptr;  ///< the frame before; null: the file stands alone
 };
 
 struct DecodedGrid {
@@ -56,7 +58,11 @@ struct OpenChunk {
 class GridDecoder {
  public:
   GridDecoder(const GridsOfFile& file, std::uint32_t grid)
-      : sections_(file.sections), records_(file.records), g_(grid), part_(file.part) {}
+      : sections_(file.sections),
+        records_(file.records),
+        g_(grid),
+        part_(file.part),
+        previous_(file.previous) {}
 
   /// Reads the record of a grid alone. \throws BadInput  the record is damaged
   DecodedGrid decodeRecord() { return readRecords(); }
@@ -72,6 +78,7 @@ class GridDecoder {
     readVoxels(grid);
     readRelated(before, grid);
     readResidual(grid);
+    getNonFinite(sections_, g_, previous_, grid);
     readLayerErrors(grid);
     readCurve(grid);
     return decoded;
@@ -301,6 +308,7 @@ class GridDecoder {
   GridRecords& records_;
   std::uint32_t g_;
   const ReadPart* part_;
+  const EsvrFile* previous_;
   std::vector<ChunkRecord> chunks_;
   std::size_t layers_ = kAllLayers;  ///< number of layers to read
   std::size_t layersInFile_ = 0;     ///< largest number of layers of a chunk that was opened
@@ -377,6 +385,7 @@ StoredGrid readAfter(SectionReader& sections, const SectionId& section, const Es
   StoredGrid grid =
       getPredicted(sections.get(section), where, previous.grids[section.grid], sections.budget());
   if (const auto fault = faultOf(grid)) throw BadInput(where + ": " + fault->text);
+  getNonFinite(sections, section.grid, &previous, grid);
   return grid;
 }
 
@@ -407,7 +416,7 @@ std::vector<std::uint64_t> readGrids(SectionReader& sections, const ReadPart* pa
   const auto needed = neededGrids(sections, records.count(), part);
   std::vector<std::uint64_t> ellipsoids;
   for (std::uint32_t g = 0; g < needed.size(); ++g) {
-    const GridsOfFile source{sections, records, part};
+    const GridsOfFile source{.sections = sections, .records = records, .part = part};
     GridDecoder decoder(source, g);
     DecodedGrid decoded = needed[g] ? decoder.decode(file.grids) : decoder.decodeRecord();
     file.grids.push_back(std::move(decoded.grid));
@@ -420,12 +429,12 @@ std::vector<std::uint64_t> readGrids(SectionReader& sections, const ReadPart* pa
 void readGridsAfter(SectionReader& sections, const EsvrFile& previous, EsvrFile& file) {
   if (sections.has({SectionKind::kGridRecords})) file.layout = FileLayout::kCompact;
   GridRecords records(sections);
+  const GridsOfFile source{.sections = sections, .records = records, .previous = &previous};
   const std::uint32_t count = records.count() + sections.count(SectionKind::kPredicted);
   for (std::uint32_t g = 0; g < count; ++g) {
     const SectionId difference{SectionKind::kPredicted, g};
-    file.grids.push_back(sections.has(difference)
-                             ? readAfter(sections, difference, previous)
-                             : GridDecoder({sections, records}, g).decode(file.grids).grid);
+    file.grids.push_back(sections.has(difference) ? readAfter(sections, difference, previous)
+                                                  : GridDecoder(source, g).decode(file.grids).grid);
   }
 }
 
@@ -492,7 +501,8 @@ std::uint64_t heapBytesOf(const StoredGrid& grid) {
     ellipsoids += double(chunk.ellipsoids.size()) * format::kDecodedBytesPerEllipsoid;
   return std::uint64_t(ellipsoids) + grid.bricks.size() * sizeof(Coord) +
          grid.mask.size() * sizeof(BrickMask) + (grid.voxels ? heapBytesOf(*grid.voxels) : 0) +
-         (grid.residual ? heapBytesOf(*grid.residual) : 0);
+         (grid.residual ? heapBytesOf(*grid.residual) : 0) +
+         (grid.nonFiniteVoxels ? heapBytesOf(*grid.nonFiniteVoxels) : 0);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,7 +16,9 @@
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
 #include "field/voxel_rule.h"
+#include "format/decode_bricks.h"
 #include "format/grid_rule.h"
+#include "format/non_finite_section.h"
 
 namespace esvr {
 
@@ -38,7 +42,7 @@ RevoxeliseOptions voxelRule(const StoredGrid& grid) {
 }
 
 bool followsFromEllipsoids(const StoredGrid& grid) {
-  return !grid.voxels && !grid.residual && !grid.farBackground;
+  return !grid.voxels && !grid.residual && !grid.farBackground && grid.nonFinite.total() == 0;
 }
 
 VoxelRule format::ruleOf(const StoredGrid& grid) {
@@ -69,13 +73,15 @@ EstimateOptions optionsFor(const StoredGrid& grid, const DecodeOptions& options)
 }  // namespace
 
 WorkEstimate estimateDecode(const StoredGrid& grid, const DecodeOptions& options) {
-  if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size())};
+  const double nonFinite = grid.nonFiniteVoxels ? double(grid.nonFiniteVoxels->bricks.size()) : 0.0;
+  if (grid.voxels) return {.bricks = double(grid.voxels->bricks.size()) + nonFinite};
   WorkEstimate work = estimateWork(grid.field, optionsFor(grid, options));
   if (grid.topology != TopologyKind::kThreshold)
     work.bricks = double(grid.bricks.size());
   else
     work.bricks += double(grid.boxVoxels.size());
   if (grid.residual) work.bricks += double(grid.residual->bricks.size());
+  work.bricks += nonFinite;
   return work;
 }
 
@@ -94,27 +100,37 @@ Box placeOf(const StoredGrid& grid, const DecodeOptions& options) {
   return options.box ? common(grid.activeBox, *options.box) : grid.activeBox;
 }
 
-/// The grid's rule within the wanted box, and the lists that it refers to.
+/// Some bricks of a grid by their increasing corners; nothing: all of them.
+using ChosenBricks = std::optional<std::span<const Coord>>;
+
+/// The grid's rule within the wanted box and bricks, and the lists that it refers to.
 struct WantedVoxels {
   RevoxeliseOptions rule;
   std::vector<Coord> bricks{};
   std::vector<BrickMask> masks{};
 
-  WantedVoxels(const StoredGrid& grid, const DecodeOptions& options) : rule(voxelRule(grid)) {
+  WantedVoxels(const StoredGrid& grid, const DecodeOptions& options, const ChosenBricks& chosen)
+      : rule(voxelRule(grid)) {
     rule.threshold = options.threshold.value_or(rule.threshold);
     if (options.threshold) rule.masks = {}, rule.alwaysActive = {};
     rule.box = placeOf(grid, options);
     rule.memory = options.memory;
-    if (rule.restrictToBricks && options.box) takeThose();
+    if (rule.restrictToBricks && (options.box || chosen)) {
+      takeThose(chosen);
+    } else if (chosen) {
+      rule.restrictToBricks = true;
+      rule.bricks = *chosen;
+    }
   }
   WantedVoxels(const WantedVoxels&) = delete;
   WantedVoxels& operator=(const WantedVoxels&) = delete;
 
  private:
-  /// Leaves out the bricks outside the box.
-  void takeThose() {
+  /// Leaves out the bricks outside the box and those that are not chosen.
+  void takeThose(const ChosenBricks& chosen) {
     for (std::size_t b = 0; b < rule.bricks.size(); ++b) {
       if (!meets(rule.box, rule.bricks[b])) continue;
+      if (chosen && !std::ranges::binary_search(*chosen, rule.bricks[b])) continue;
       bricks.push_back(rule.bricks[b]);
       if (!rule.masks.empty()) masks.push_back(rule.masks[b]);
     }
@@ -173,8 +189,9 @@ SparseVolume evaluatedWithResidual(const StoredGrid& grid, const RevoxeliseOptio
   return volume;
 }
 
-SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options) {
-  const WantedVoxels wanted(grid, options);
+SparseVolume evaluated(const StoredGrid& grid, const DecodeOptions& options,
+                       const ChosenBricks& chosen) {
+  const WantedVoxels wanted(grid, options, chosen);
   return grid.residual ? evaluatedWithResidual(grid, wanted.rule)
                        : revoxelise(grid.field, wanted.rule);
 }
@@ -206,24 +223,90 @@ bool isExact(const StoredGrid& grid) {
   return grid.voxels && grid.voxels->form != VoxelForm::kQuantised;
 }
 
-}  // namespace
+/// The layer's voxels in some bricks.
+VoxelLayer partOf(const VoxelLayer& layer, std::span<const Coord> chosen) {
+  VoxelLayer part;
+  part.form = layer.form;
+  part.divisor = layer.divisor;
+  part.palette = layer.palette;
+  part.origin = layer.origin;
+  part.background = layer.background;
+  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
+    if (!std::ranges::binary_search(chosen, layer.origin + layer.bricks[b] * kBrickSide)) continue;
+    part.bricks.push_back(layer.bricks[b]);
+    part.active.push_back(layer.active[b]);
+    part.vacant.push_back(layer.vacant[b]);
+    const auto first = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
+    part.codes.insert(part.codes.end(), first, first + kBrickVoxels);
+  }
+  return part;
+}
 
-SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
+void requirePossible(const StoredGrid& grid, const DecodeOptions& options) {
   if (options.threshold && !(std::isfinite(*options.threshold) && *options.threshold >= 0.0f))
     throw UsageError("the threshold must be 0 or above, not " + std::to_string(*options.threshold));
   if (options.threshold && (grid.voxels || grid.farBackground))
     throw UsageError("grid '" + shownName(grid.descriptor.name) +
                      "' says itself which voxels are active: it takes no threshold");
   if (options.box && options.box->empty()) throw UsageError("the box of voxels is empty");
-  if (options.maxBytes != kNoMemoryLimit)
-    requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
-                        "grid '" + shownName(grid.descriptor.name) + "'");
-  SparseVolume volume = grid.voxels ? volumeOf(*grid.voxels) : evaluated(grid, options);
+}
+
+SparseVolume decodedPart(const StoredGrid& grid, const DecodeOptions& options,
+                         const ChosenBricks& chosen) {
+  SparseVolume volume = !grid.voxels ? evaluated(grid, options, chosen)
+                        : chosen     ? volumeOf(partOf(*grid.voxels, *chosen))
+                                     : volumeOf(*grid.voxels);
   if (grid.voxels && grid.tone.isOn() && !isExact(grid)) applyTone(format::ruleOf(grid), volume);
   if (grid.voxels && options.box) clip(*options.box, format::ruleOf(grid), volume);
   if (grid.farBackground) setBackground(float(grid.descriptor.background), volume);
   if (grid.descriptor.valueType == ValueType::kHalf && !isExact(grid)) roundToHalfs(volume);
+  format::restoreNonFinite(
+      grid, {placeOf(grid, options), chosen},
+      options.keepsNonFinite ? format::NonFiniteAs::kStored : format::NonFiniteAs::kEmpty, volume);
   return volume;
+}
+
+}  // namespace
+
+SparseVolume decodeGrid(const StoredGrid& grid, const DecodeOptions& options) {
+  requirePossible(grid, options);
+  if (options.maxBytes != kNoMemoryLimit)
+    requireWithinMemory(estimateDecode(grid, options).bytes(options.memory), options.maxBytes,
+                        "grid '" + shownName(grid.descriptor.name) + "'");
+  return decodedPart(grid, options, {});
+}
+
+// ---- Some bricks
+
+namespace {
+
+void addCorners(const VoxelLayer& layer, std::vector<Coord>& corners) {
+  for (const Coord brick : layer.bricks) corners.push_back(layer.origin + brick * kBrickSide);
+}
+
+}  // namespace
+
+std::vector<Coord> format::decodedBricks(const StoredGrid& grid, const DecodeOptions& options) {
+  requirePossible(grid, options);
+  const WantedVoxels wanted(grid, options, {});
+  std::vector<Coord> corners;
+  if (grid.voxels)
+    addCorners(*grid.voxels, corners);
+  else if (grid.residual)
+    corners = withResidualBricks(grid, wanted.rule);
+  else
+    corners = voxelBricks(grid.field, wanted.rule);
+  if (grid.nonFiniteVoxels && options.keepsNonFinite) addCorners(*grid.nonFiniteVoxels, corners);
+  std::erase_if(corners, [&](Coord corner) { return !meets(wanted.rule.box, corner); });
+  std::ranges::sort(corners);
+  corners.erase(std::unique(corners.begin(), corners.end()), corners.end());
+  return corners;
+}
+
+SparseVolume format::decodeBricks(const StoredGrid& grid, const DecodeOptions& options,
+                                  std::span<const Coord> bricks) {
+  requirePossible(grid, options);
+  return decodedPart(grid, options, bricks);
 }
 
 // ---- Vectors

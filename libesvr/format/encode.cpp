@@ -14,6 +14,7 @@
 #include "esvr/grid.h"
 #include "format/activity_sections.h"
 #include "format/ellipsoid_sections.h"
+#include "format/non_finite_section.h"
 #include "format/predicted_sections.h"
 #include "format/records.h"
 
@@ -109,6 +110,7 @@ void checkGrid(const StoredGrid& grid) {
     refuse(grid, "its quantised chunks are not those of its field");
   checkLayers(grid);
   if (const auto fault = residualFaultOf(grid)) refuse(grid, fault->text);
+  if (const auto fault = nonFiniteFaultOf(grid)) refuse(grid, fault->text);
   for (std::size_t c = 0; c < grid.field.chunks.size(); ++c) {
     const auto& ellipsoids = grid.field.chunks[c].ellipsoids;
     checkInvariants(ellipsoids);
@@ -223,6 +225,18 @@ void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> 
   if (!grid.curve.empty()) out.add({SectionKind::kCurve, g}, kOptional, putCurve(grid.curve));
 }
 
+/// \param before  the same grid of the frame before; null: the grid stands alone
+void addNonFinite(SectionWriter& out, std::uint32_t g, const StoredGrid& grid,
+                  const StoredGrid* before) {
+  if (grid.nonFiniteVoxels)
+    out.addRaw({SectionKind::kNonFinite, g}, kRequired, putNonFinite(grid, before));
+}
+
+/// The grid of the same number in the frame before; null if there is none.
+const StoredGrid* gridBefore(const EsvrFile* previous, std::size_t g) {
+  return previous && g < previous->grids.size() ? &previous->grids[g] : nullptr;
+}
+
 /// Adds the records of carried grids.
 /// \param first  number of the first of them
 void addCarriedRecords(SectionWriter& out, const std::vector<CarriedGrid>& grids,
@@ -286,10 +300,17 @@ void addRecords(SectionWriter& out, const std::vector<SortedGrid>& grids,
     if (!differences[g]) addGrid(out, g, grids[g]);
 }
 
+/// What is known of the frame before a frame that refers to it.
+struct FrameContext {
+  Differences
+      differences;  ///< for each grid: its difference from the frame before, which replaces it
+  Inherited inherited{};
+  const EsvrFile* previous = nullptr;  ///< null: the file stands alone
+};
+
 /// Checks a file and collects its sections.
-/// \param differences  for each grid: its difference from the previous frame, which replaces it
-SectionWriter collect(const EsvrFile& file, const Differences& differences,
-                      const Inherited& inherited) {
+SectionWriter collect(const EsvrFile& file, const FrameContext& context) {
+  const auto& [differences, inherited, previous] = context;
   (void)gridsInOrder(file);  // refuses places that are impossible
   checkVectors(file);
   std::vector<SortedGrid> grids;
@@ -315,6 +336,7 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
+    addNonFinite(out, g, file.grids[g], gridBefore(previous, g));
     if (differences[g]) continue;
     addChunks(out, g, grids[g]);
     addExtras(out, g, file.grids);
@@ -327,8 +349,15 @@ SectionWriter collect(const EsvrFile& file, const Differences& differences,
 
 namespace format {
 
+std::uint64_t bytesOfNonFinite(const StoredGrid& grid) {
+  if (!grid.nonFiniteVoxels) return 0;
+  SectionWriter out;
+  out.addRaw({SectionKind::kNonFinite, 0}, kRequired, putNonFinite(grid, nullptr));
+  return out.bytesUnshared();
+}
+
 SectionWriter sectionsOf(const EsvrFile& file) {
-  return collect(file, Differences(file.grids.size()), {});
+  return collect(file, {Differences(file.grids.size())});
 }
 
 std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
@@ -341,11 +370,11 @@ std::optional<std::vector<std::byte>> differenceOf(const StoredGrid& grid,
 
 namespace {
 
-/// Bytes of a grid in a frame if it is not stored as a difference. The record of a grid that refers
+/// Bytes of a grid in a frame if it is not stored as a difference, without the voxels that are not finite. The record of a grid that refers
 /// to another one is estimated, because it is compressed together with others.
 std::uint64_t bytesOfOwn(const EsvrFile& frame, std::size_t g) {
   constexpr std::uint64_t kJoinedRecordBytes = 64;
-  if (!frame.grids[g].reference) return bytesAdded(frame, g);
+  if (!frame.grids[g].reference) return bytesAdded(frame, g) - bytesOfNonFinite(frame.grids[g]);
   SectionWriter out;
   addRelated(out, std::uint32_t(g), frame.grids);
   return out.bytesUnshared() - kEntryBytes + kFrameRowBytes + kJoinedRecordBytes;
@@ -360,7 +389,7 @@ std::optional<FrameSections> collectDifferences(const EsvrFile& frame, const Esv
   }
   if (!any) return std::nullopt;
   const Inherited inherited = inheritedFrom(previous, frame);
-  return FrameSections{collect(frame, differences, inherited), inherited};
+  return FrameSections{collect(frame, {std::move(differences), inherited, &previous}), inherited};
 }
 
 std::uint64_t frameBytesOf(const std::optional<FrameSections>& frame) {
@@ -413,6 +442,7 @@ std::uint64_t bytesAdded(const EsvrFile& file, std::size_t grid) {
   addChunkTable(out, g, own);
   addChunks(out, g, own);
   addExtras(out, g, file.grids);
+  addNonFinite(out, g, file.grids[grid], nullptr);
   return out.bytesUnshared();
 }
 

@@ -30,6 +30,9 @@ struct FrameSections {
 [[nodiscard]] std::optional<FrameSections> differencesOf(const EsvrFile& frame,
                                                          const EsvrFile& previous);
 
+/// Largest number of bytes that the section of voxels which are not finite adds to a file; 0 if the grid needs none.
+[[nodiscard]] std::uint64_t bytesOfNonFinite(const StoredGrid& grid);
+
 /// The difference of a grid from that of the previous frame, if it takes fewer bytes in a frame than
 /// the grid.
 /// \param ownBytes  bytes of the grid without a previous frame

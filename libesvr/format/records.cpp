@@ -86,12 +86,14 @@ constexpr std::uint8_t kTopologies = 4;     // the numbers of topologies are bel
 constexpr std::uint8_t kFarBackground = 4;  // StoredGrid::farBackground
 constexpr std::uint8_t kHasBoxVoxels = 8;   // the record has StoredGrid::boxVoxels
 constexpr std::uint8_t kHasTone = 16;       // the record has StoredGrid::tone
+constexpr std::uint8_t kHasNonFinite = 32;  // the record has StoredGrid::nonFinite
 
 void putTopology(ByteWriter& out, const StoredGrid& grid) {
   unsigned topology = unsigned(grid.topology);
   if (grid.farBackground) topology += kFarBackground;
   if (!grid.boxVoxels.empty()) topology += kHasBoxVoxels;
   if (grid.tone.isOn()) topology += kHasTone;
+  if (grid.nonFinite.total() > 0) topology += kHasNonFinite;
   out.put(std::uint8_t(topology));
 }
 
@@ -99,7 +101,7 @@ void putTopology(ByteWriter& out, const StoredGrid& grid) {
 std::uint8_t getTopology(ByteReader& in, StoredGrid& grid) {
   const auto topology = in.get<std::uint8_t>();
   const bool isKnown =
-      topology < 2 * kHasTone && topology % kTopologies <= std::uint8_t(TopologyKind::kMask);
+      topology < 2 * kHasNonFinite && topology % kTopologies <= std::uint8_t(TopologyKind::kMask);
   if (!isKnown) in.fail("unknown topology " + std::to_string(topology));
   grid.topology = TopologyKind(topology % kTopologies);
   grid.farBackground = (topology & kFarBackground) != 0;
@@ -128,6 +130,24 @@ std::vector<Coord> getBoxVoxels(ByteReader& in, const Box& box) {
   return voxels;
 }
 
+void putNonFiniteCounts(ByteWriter& out, const NonFiniteCounts& counts) {
+  if (counts.total() == 0) return;
+  for (const std::uint64_t count : {counts.nan, counts.plusInfinity, counts.minusInfinity})
+    putVarint(out, count);
+}
+
+/// \param most  the number of active voxels
+NonFiniteCounts getNonFiniteCounts(ByteReader& in, std::uint64_t most) {
+  NonFiniteCounts counts;
+  for (auto* const count : {&counts.nan, &counts.plusInfinity, &counts.minusInfinity}) {
+    *count = getVarint(in);
+    if (*count > most) in.fail("more voxels that are not finite than active ones");
+    most -= *count;
+  }
+  if (counts.total() == 0) in.fail("a mark of voxels that are not finite without any");
+  return counts;
+}
+
 void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
   putTopology(out, grid);
   putEnum(out, grid.withinRange);
@@ -136,6 +156,7 @@ void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
   putBoxVoxels(out, grid);
   if (grid.tone.isOn()) out.put(grid.tone.scale);
   out.put(grid.activeVoxels);
+  putNonFiniteCounts(out, grid.nonFinite);
   out.put(grid.valueMin);
   out.put(grid.valueMax);
 }
@@ -150,6 +171,7 @@ void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
     if (!grid.tone.isOn()) in.fail("the scale of its tone curve is not above 0");
   }
   grid.activeVoxels = in.get<std::uint64_t>();
+  if (has & kHasNonFinite) grid.nonFinite = getNonFiniteCounts(in, grid.activeVoxels);
   grid.valueMin = in.get<float>();
   grid.valueMax = in.get<float>();
 }

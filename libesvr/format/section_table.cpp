@@ -47,6 +47,7 @@ constexpr Named<SectionKind> kKinds[] = {
     {SectionKind::kCarriedBytes, "carried bytes"},
     {SectionKind::kPredicted, "predicted grid"},
     {SectionKind::kRelated, "related voxels"},
+    {SectionKind::kNonFinite, "non-finite voxels"},
     {SectionKind::kSequenceIndex, "sequence index"},
 };
 constexpr Named<Codec> kCodecs[] = {{Codec::kRaw, "raw"},
@@ -88,6 +89,8 @@ std::uint16_t minorVersionOf(SectionKind kind) {
     case SectionKind::kPacked:
     case SectionKind::kRelated:
       return 4;
+    case SectionKind::kNonFinite:
+      return 6;
     default:
       return 0;
   }

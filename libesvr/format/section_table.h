@@ -24,7 +24,7 @@ namespace esvr::format {
 inline constexpr std::array<std::uint8_t, 8> kMagic{0x89, 'E', 'S', 'V', 'R', '\r', '\n', '\n'};
 
 inline constexpr std::uint16_t kVersionMajor = kFormatVersion;
-inline constexpr std::uint16_t kVersionMinor = 5;
+inline constexpr std::uint16_t kVersionMinor = 6;
 
 inline constexpr std::uint64_t kHeaderBytes = 48;
 inline constexpr std::uint64_t kHeaderChecksumAt = 40;
@@ -58,6 +58,7 @@ enum class SectionKind : std::uint32_t {
   kCarriedBytes = 38,
   kPredicted = 39,
   kRelated = 41,
+  kNonFinite = 42,
   kSequenceIndex = 64,
 };
 

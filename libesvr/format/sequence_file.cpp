@@ -44,11 +44,14 @@ bool dependsOnPrevious(std::span<const std::byte> bytes) {
 }
 
 std::uint64_t bytesInFrame(const StoredGrid& grid, const StoredGrid* previous) {
-  const std::uint64_t own = bytesAdded(grid);
+  const std::uint64_t nonFinite = bytesOfNonFinite(grid);
+  const std::uint64_t own = bytesAdded(grid) - nonFinite;
   if (previous)
-    if (const auto difference = differenceOf(grid, *previous, own))
-      return difference->size() + kFrameRowBytes;
-  return own;
+    if (const auto difference = differenceOf(grid, *previous, own)) {
+      const bool isSame = previous->nonFiniteVoxels == grid.nonFiniteVoxels;
+      return difference->size() + kFrameRowBytes + (isSame ? 0 : nonFinite);
+    }
+  return own + nonFinite;
 }
 
 // ---- The reader

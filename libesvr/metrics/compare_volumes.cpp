@@ -41,7 +41,9 @@ struct ErrorSums {
   // sums over all bricks
   double squaredErrorActive = 0.0;  ///< over the active voxels of the reference
   std::uint64_t activeReference = 0, activeUnion = 0, activeIntersection = 0;
-  std::optional<Coord> nonFinite;  ///< the first voxel whose error is not a number or infinite
+  std::uint64_t leftOut = 0;  ///< voxels of the bricks in the box that are equal and not finite
+  std::uint64_t leftOutActive = 0;  ///< the same over all bricks
+  std::optional<Coord> nonFinite;   ///< the first voxel whose error is not a number or infinite
 
   void keepLargest(double error, Coord at) {
     if (error <= maxError) return;
@@ -49,6 +51,14 @@ struct ErrorSums {
     maxErrorAt = at;
   }
 };
+
+/// True if both volumes have an active voxel with the same value that is not finite.
+bool areEqualNonFinite(const BrickPair& pair, int v) {
+  const double a = pair.referenceAt(v), b = pair.candidateAt(v);
+  const bool areSame = (std::isnan(a) && std::isnan(b)) || (std::isinf(a) && a == b);
+  return areSame && pair.isReferenceActive(v) && pair.candidateActive &&
+         pair.candidateActive->test(v);
+}
 
 ErrorSums sumsOfPair(const BrickPair& pair, const ErrorDomain& domain) {
   ErrorSums sums;
@@ -59,6 +69,10 @@ ErrorSums sumsOfPair(const BrickPair& pair, const ErrorDomain& domain) {
       for (int z = local.min.z; z <= local.max.z; ++z) {
         const int v = voxelOffset({x, y, z});
         const double error = pair.errorAt(v);
+        if (!std::isfinite(error)) {
+          sums.leftOut += areEqualNonFinite(pair, v);
+          continue;
+        }
         sums.squaredError += error * error;
         sums.massReference += pair.referenceAt(v) - domain.backgrounds.reference;
         sums.massCandidate += pair.candidateAt(v) - domain.backgrounds.candidate;
@@ -66,8 +80,13 @@ ErrorSums sumsOfPair(const BrickPair& pair, const ErrorDomain& domain) {
       }
   for (int v = 0; v < kBrickVoxels; ++v) {
     const double error = pair.errorAt(v);
-    if (pair.isReferenceActive(v)) sums.squaredErrorActive += error * error;
-    if (!sums.nonFinite && !std::isfinite(error)) sums.nonFinite = pair.voxelAt(v);
+    if (std::isfinite(error)) {
+      if (pair.isReferenceActive(v)) sums.squaredErrorActive += error * error;
+    } else if (areEqualNonFinite(pair, v)) {
+      ++sums.leftOutActive;
+    } else if (!sums.nonFinite) {
+      sums.nonFinite = pair.voxelAt(v);
+    }
   }
   static constexpr BrickMask kNone{};
   const BrickMask& a = pair.referenceActive ? *pair.referenceActive : kNone;
@@ -91,6 +110,8 @@ ErrorSums joined(ErrorSums a, const ErrorSums& b) {
   a.activeReference += b.activeReference;
   a.activeUnion += b.activeUnion;
   a.activeIntersection += b.activeIntersection;
+  a.leftOut += b.leftOut;
+  a.leftOutActive += b.leftOutActive;
   if (!a.nonFinite) a.nonFinite = b.nonFinite;
   return a;
 }
@@ -143,8 +164,26 @@ struct Comparison {
   std::vector<BrickPair> pairs;
   ErrorSums sums;
 
-  [[nodiscard]] double mseBox() const { return sums.squaredError / domain.box.volume(); }
+  /// Voxels of the box that count.
+  [[nodiscard]] double voxels() const { return domain.box.volume() - double(sums.leftOut); }
+  [[nodiscard]] double mseBox() const {
+    return voxels() > 0.0 ? sums.squaredError / voxels() : 0.0;
+  }
 };
+
+[[noreturn]] void refuseNonFinite(const SparseVolume& reference, const SparseVolume& candidate,
+                                  Coord at) {
+  const auto name = [](float value) -> std::string {
+    if (std::isnan(value)) return "NaN";
+    if (std::isinf(value)) return value > 0.0f ? "infinity" : "minus infinity";
+    return "a number";
+  };
+  const std::string a = name(valueAt(reference, at)), b = name(valueAt(candidate, at));
+  // Such values at voxels that are not active in both volumes have the same name.
+  throw BadInput("the value at " + toString(at) + " is not finite: it is " + a +
+                 " in the reference" +
+                 (a == b ? ", and not active in both" : ", and " + b + " in the other one"));
+}
 
 Comparison compared(const SparseVolume& reference, const SparseVolume& candidate,
                     const CompareOptions& options) {
@@ -158,8 +197,7 @@ Comparison compared(const SparseVolume& reference, const SparseVolume& candidate
                      " has no voxel");
   c.pairs = metrics::pairBricks(reference, candidate);
   c.sums = sumErrors(c.pairs, c.domain);
-  if (c.sums.nonFinite)
-    throw BadInput("the value at " + toString(*c.sums.nonFinite) + " is not finite");
+  if (c.sums.nonFinite) refuseNonFinite(reference, candidate, *c.sums.nonFinite);
   if (!std::isfinite(reference.background) || !std::isfinite(candidate.background))
     throw BadInput("the background is not finite");
   c.peak = options.peak ? *options.peak : peakOf(reference);
@@ -185,29 +223,56 @@ double psnr(double mse, double peak) {
   return 20.0 * std::log10(peak) - 10.0 * std::log10(mse);
 }
 
-VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& candidate,
-                             const CompareOptions& options) {
-  constexpr std::uint64_t kP999Permille = 999;
-  const Comparison c = compared(reference, candidate, options);
+namespace {
+
+/// The figures that follow from the sums.
+VolumeMetrics figuresOf(const Comparison& c) {
   const ErrorSums& sums = c.sums;
   VolumeMetrics m;
   m.peak = c.peak;
-  m.boxVoxels = c.domain.box.volume();
-  m.activeVoxels = sums.activeReference;
+  m.boxVoxels = c.voxels();
+  m.nonFinite = sums.leftOutActive;
+  m.activeVoxels = sums.activeReference - sums.leftOutActive;
   m.mseBox = c.mseBox();
-  m.mseActive = sums.squaredErrorActive / double(sums.activeReference);
+  m.mseActive = m.activeVoxels > 0 ? sums.squaredErrorActive / double(m.activeVoxels) : 0.0;
   m.psnrBox = psnr(m.mseBox, m.peak);
   m.psnrActive = psnr(m.mseActive, m.peak);
-  m.maxError = sums.maxError;
+  m.maxError = std::max(sums.maxError, 0.0);  // below 0 if no voxel counts
   m.maxErrorAt = sums.maxErrorAt;
-  m.p999Error =
-      metrics::errorOfRank(c.pairs, metrics::nearestRank(sums.activeUnion, kP999Permille));
-  m.iou = double(sums.activeIntersection) / double(sums.activeUnion);
+  const std::uint64_t either = sums.activeUnion - sums.leftOutActive;
+  if (either > 0) m.iou = double(sums.activeIntersection - sums.leftOutActive) / double(either);
   m.massReference = sums.massReference;
   m.massCandidate = sums.massCandidate;
+  return m;
+}
+
+/// Adds the figures that need the volumes, all of whose values are finite.
+void addFigures(const SparseVolume& reference, const SparseVolume& candidate,
+                const CompareOptions& options, const Comparison& c, VolumeMetrics& m) {
+  constexpr std::uint64_t kP999Permille = 999;
+  const std::uint64_t either = c.sums.activeUnion - c.sums.leftOutActive;
+  if (either > 0)
+    m.p999Error = metrics::errorOfRank(c.pairs, metrics::nearestRank(either, kP999Permille));
   if (options.ssim) m.ssim = ssim3d(reference, candidate, c.domain.box, c.peak);
   if (options.transmittance)
     m.transmittance = transmittancePsnr(reference, candidate, c.domain.box);
+}
+
+}  // namespace
+
+VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& candidate,
+                             const CompareOptions& options) {
+  Comparison c = compared(reference, candidate, options);
+  VolumeMetrics m = figuresOf(c);
+  if (m.nonFinite == 0) {
+    addFigures(reference, candidate, options, c, m);
+    return m;
+  }
+  SparseVolume a = reference, b = candidate;
+  dropNonFinite(a);
+  dropNonFinite(b);
+  c.pairs = metrics::pairBricks(a, b);
+  addFigures(a, b, options, c, m);
   return m;
 }
 
@@ -235,7 +300,7 @@ RelativeError largestRelativeError(const SparseVolume& reference, const SparseVo
   const auto pairs = metrics::pairBricks(reference, candidate);
   const auto errorAt = [&](const BrickPair& pair, int v) {
     const double error = std::abs(pair.errorAt(v));
-    if (error == 0.0) return RelativeError{};
+    if (error == 0.0 || areEqualNonFinite(pair, v)) return RelativeError{};
     const double share = error / std::max(std::abs(double(pair.referenceAt(v))), least);
     return RelativeError{std::isnan(share) ? std::numeric_limits<double>::infinity() : share,
                          pair.voxelAt(v)};

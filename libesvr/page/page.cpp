@@ -251,8 +251,9 @@ void page_histogram(const esvr_volume* volume, double low, double high, int coun
   const SparseVolume& voxels = volume->voxels;
   for (std::size_t b = 0; b < voxels.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v) {
-      if (!voxels.active[b].test(v)) continue;
-      const double place = (double(voxels.brickValues(b)[std::size_t(v)]) - low) * perUnit;
+      const float value = voxels.brickValues(b)[std::size_t(v)];
+      if (!voxels.active[b].test(v) || !std::isfinite(value)) continue;
+      const double place = (double(value) - low) * perUnit;
       ++counts[int(std::clamp(place, 0.0, double(count - 1)))];
     }
 }

@@ -490,8 +490,9 @@ LookBasis lookBasis(const StoredGrid& grid, std::uint64_t maxBytes) {
                   .background = float(grid.descriptor.background),
                   .isLevelSet = grid.descriptor.gridClass == GridClass::kLevelSet};
   if (grid.descriptor.gridClass != GridClass::kFogVolume || grid.activeBox.empty()) return basis;
-  basis.medianDepth = grid.voxels ? medianDepth(decodeGrid(grid, {.maxBytes = maxBytes}))
-                                  : medianDepth(grid.field, grid.activeBox, basis.range, grid.tone);
+  basis.medianDepth =
+      grid.voxels ? medianDepth(decodeGrid(grid, {.maxBytes = maxBytes, .keepsNonFinite = false}))
+                  : medianDepth(grid.field, grid.activeBox, basis.range, grid.tone);
   return basis;
 }
 

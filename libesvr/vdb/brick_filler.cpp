@@ -86,7 +86,12 @@ void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
 }
 
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
-  if (tally.count == 0 || nonFinite != NonFinite::kRefuse) return;
+  if (tally.count == 0) return;
+  if (nonFinite == NonFinite::kKeep)
+    throw CannotConvert(
+        std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
+        " finite but too large for float; the first is at " + toString(tally.first));
+  if (nonFinite != NonFinite::kRefuse) return;
   throw NotFinite(std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
                   " NaN, infinite or too large for float; the first is at " +
                   toString(tally.first));

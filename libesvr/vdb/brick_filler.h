@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -19,6 +20,19 @@
 #include "esvr/volume.h"
 
 namespace esvr::vdb {
+
+/// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
+struct NonFiniteTally {
+  float replacement = 0.0f;  ///< which they become
+  bool keeps = false;        ///< NaN and infinite values remain, and are not counted
+  std::uint64_t count = 0;
+  Coord first{};  ///< the first one in the order of bricks and of voxels in a brick
+
+  void add(Coord voxel) {
+    if (count++ == 0 || std::pair(brickOf(voxel), voxel) < std::pair(brickOf(first), first))
+      first = voxel;
+  }
+};
 
 /// The rules by which the voxels of a grid become those of a volume.
 struct FillRules {
@@ -29,9 +43,9 @@ struct FillRules {
   bool allowEmpty = false;
   bool countInactive = true;  ///< false for leaves whose inactive values are approximations
 
-  /// What a voxel becomes that is not finite and is not refused.
-  [[nodiscard]] float replacement() const {
-    return nonFinite == NonFinite::kBackground ? background : nonFiniteValue;
+  [[nodiscard]] NonFiniteTally tally() const {
+    return {.replacement = nonFinite == NonFinite::kBackground ? background : nonFiniteValue,
+            .keeps = nonFinite == NonFinite::kKeep};
   }
 };
 
@@ -42,18 +56,8 @@ float narrowBackground(double background);
 ///                         disk has free if they are kept in files
 void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options);
 
-/// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
-struct NonFiniteTally {
-  float replacement = 0.0f;  ///< which they become
-  std::uint64_t count = 0;
-  Coord first{};  ///< the first one in the order of bricks and of voxels in a brick
-
-  void add(Coord voxel) {
-    if (count++ == 0 || std::pair(brickOf(voxel), voxel) < std::pair(brickOf(first), first))
-      first = voxel;
-  }
-};
-/// \throws BadInput  there are such voxels, and they are not to be replaced
+/// \throws NotFinite  there are such voxels, and they are not to be replaced
+/// \throws CannotConvert  those that are not NaN or infinite are to be kept
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite);
 
 /// A tile.
@@ -125,6 +129,8 @@ void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tall
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   const auto narrow = float(value);
   if (std::isfinite(narrow)) return narrow;
+  if (tally.keeps && !std::isfinite(value))
+    return std::isnan(value) ? std::numeric_limits<float>::quiet_NaN() : narrow;
   tally.add(voxel);
   return tally.replacement;
 }

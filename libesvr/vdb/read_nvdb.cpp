@@ -394,8 +394,7 @@ void readNanoAs(const NanoBuffer& buffer, std::size_t component, const ReadOptio
                         kHasExactValues<Build>};
   auto corners = brickCorners(tree, options);
   SparseVolume& volume = grid.volume = layOutBricks(corners, rules, options.memory);
-  FillTallies tallies{{.replacement = rules.replacement()},
-                      InactiveCounter(background, rules.levelSet)};
+  FillTallies tallies{rules.tally(), InactiveCounter(background, rules.levelSet)};
   tree.visit(
       component,
       [&](Coord corner, const Leaf& leaf) {

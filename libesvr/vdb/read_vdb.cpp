@@ -261,8 +261,7 @@ void readVoxelsAs(Archive& archive, const LocatedTree& located, std::size_t comp
   const FillRules rules{narrowBackground(background),
                         grid.descriptor.gridClass == GridClass::kLevelSet, options.nonFinite,
                         options.nonFiniteValue, options.allowEmpty};
-  FillTallies tallies{{.replacement = rules.replacement()},
-                      InactiveCounter(background, rules.levelSet)};
+  FillTallies tallies{rules.tally(), InactiveCounter(background, rules.levelSet)};
   grid.volume = readVolume(reader, component, rules, options.memory, tallies);
   refuseNonFinite(tallies.nonFinite, rules.nonFinite);
   grid.descriptor.background = background;

@@ -8,9 +8,11 @@
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <unordered_map>
@@ -231,6 +233,53 @@ typename openvdb::Grid<Tree>::Ptr gridInMemory(const Voxels& voxels,
   return grid;
 }
 
+/// Gives the voxels of a brick that are not finite the background with the sign of their neighbours in the brick, from
+/// the outside inward.
+void takeSigns(std::span<float> values, float background) {
+  constexpr std::array<Coord, 6> kSteps{
+      {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}}};
+  for (bool isChanged = true; isChanged;) {
+    isChanged = false;
+    const std::vector<float> before(values.begin(), values.end());
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (std::isfinite(before[std::size_t(v)])) continue;
+      double sum = 0.0;
+      for (const Coord step : kSteps) {
+        const Coord at = voxelLocal(v) + step;
+        const float neighbour = before[std::size_t(voxelOffset(localOf(at)))];
+        if (brickOf(at) == Coord{} && std::isfinite(neighbour)) sum += neighbour;
+      }
+      if (sum == 0.0) continue;
+      values[std::size_t(v)] = float(std::copysign(background, sum));
+      isChanged = true;
+    }
+  }
+  for (float& value : values)
+    if (!std::isfinite(value)) value = background;
+}
+
+/// The volume of a level set with a sign at each voxel that is not finite. A flood fill takes the signs of inactive
+/// voxels from active ones, and these have none.
+SparseVolume withSignsForNonFinite(SparseVolume volume) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    takeSigns(volume.brickValues(b), volume.background);
+  return volume;
+}
+
+/// Sets the active voxels of leaves that are not finite.
+template <class Tree>
+void setNonFinite(const SparseVolume& volume, Tree& tree) {
+  using Value = typename Tree::ValueType;
+  openvdb::tree::ValueAccessor<Tree> accessor(tree);
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    forEachActive(volume.active[b], [&](int v) {
+      const float value = volume.brickValues(b)[std::size_t(v)];
+      const Coord at = volume.brickCorner(b) + voxelLocal(v);
+      if (!std::isfinite(value))
+        accessor.setValueOn(openvdb::Coord(at.x, at.y, at.z), Value(value));
+    });
+}
+
 template <class Tree>
 GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, LeafVoxels voxels) {
   const auto background = typename Tree::ValueType(source.descriptor.background);
@@ -239,12 +288,15 @@ GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, Le
   if (voxels == LeafVoxels::kWhenWritten && !levelSet)
     return std::make_shared<StreamedGrid<Tree, NumberVoxels>>(NumberVoxels{source.volume},
                                                               background, options.constantTiles);
-  const SparseVolume& volume = source.volume;
+  const bool isSigned = levelSet && background > 0 && hasNonFinite(source.volume);
+  const SparseVolume withSigns = isSigned ? withSignsForNonFinite(source.volume) : SparseVolume{};
+  const SparseVolume& volume = isSigned ? withSigns : source.volume;
   const auto grid = gridInMemory<Tree>(NumberVoxels{volume}, background);
   Tree& tree = grid->tree();
   // The flood fill overwrites active tiles, so it runs before there are any.
   if (levelSet && background > 0 && EmptySigns(volume).agree())
     openvdb::tools::signedFloodFill(tree);
+  if (isSigned) setNonFinite(source.volume, tree);
   if (options.constantTiles) {
     openvdb::tools::prune(tree);
     keepLeaves(NumberVoxels{volume}, tree);
@@ -294,8 +346,13 @@ void restoreDescriptor(const GridDescriptor& descriptor, GridBase& grid) {
   grid.setTransform(toOpenVdb(descriptor.transform));
 }
 
-bool isHalf(float value) { return float(openvdb::math::half(value)) == value; }
-bool fitsHalf(float value) { return std::isfinite(float(openvdb::math::half(value))); }
+// Halfs have NaN and infinities.
+bool isHalf(float value) {
+  return !std::isfinite(value) || float(openvdb::math::half(value)) == value;
+}
+bool fitsHalf(float value) {
+  return !std::isfinite(value) || std::isfinite(float(openvdb::math::half(value)));
+}
 
 /// True if all active voxels and the background are numbers of a kind.
 template <class Test>

@@ -73,8 +73,9 @@ class Drawable {
     if (const auto* grid = std::get_if<VolumeGrid>(&scenes_.front().content))
       return visit(grid->volume);
     const auto& memory = settings_.memory;
-    return visit(decodeGrid(*scenes_.front().encoded,
-                            {.maxBytes = memory.maxBytes, .memory = memory.voxels}));
+    return visit(decodeGrid(
+        *scenes_.front().encoded,
+        {.maxBytes = memory.maxBytes, .memory = memory.voxels, .keepsNonFinite = false}));
   }
 
  private:

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -259,6 +260,10 @@ TEST_F(ReportDoc, namesTheKeysOfAConversion) {
     add(VDB2ESVR, more);
   };
   convert("in.vdb", {"--count", "30"});
+  std::vector<test::InputVoxel> gaps = test::softBall({});
+  gaps.front().value = std::numeric_limits<float>::quiet_NaN();
+  test::writeInput(at("gaps.vdb"), {{.voxels = gaps}});
+  convert("gaps.vdb", {"--max-error", "5%", "--nonfinite", "keep"});
   convert("cloud.vdb", {"--max-error", "5%"});
   test::writeInput(at("surface.vdb"),
                    {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});

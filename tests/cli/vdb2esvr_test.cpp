@@ -368,7 +368,7 @@ TEST_F(Vdb2Esvr, replacesNonFiniteVoxelsByTheBackgroundOrByAValue) {
   EXPECT_EQ(valueAt(decoded, {1, 2, 3}), 0.25f);
   std::filesystem::remove(out());
   EXPECT_EQ(fitQuickly({"--nonfinite", "error"}).exitCode, 3);
-  for (const char* wrong : {"keep", "nan", "1e99", ""})
+  for (const char* wrong : {"kept", "nan", "1e99", ""})
     EXPECT_EQ(fitQuickly({"--nonfinite", wrong}).exitCode, 2) << wrong;
 }
 

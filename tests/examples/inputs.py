@@ -116,7 +116,7 @@ class Inputs:
 
 TEXTS = {"presets.json": PRESETS, "neuron.swc": SKELETON, "compressors/sz3": COMPRESSOR}
 GRIDS = {"smoke.vdb": ["density"], "ref.vdb": ["density"], "new.vdb": ["smoke"], "big.vdb": ["density"],
-         "frame.vdb": ["density", "velocity"], "fire.vdb": ["density", "temperature"]}
+         "frame.vdb": ["density", "velocity"], "fire.vdb": ["density", "temperature"], "ocean.vdb": ["salt_with_gaps"]}
 FITTED = {"smoke.esvr": "smoke.vdb", "frames smoke.esvr": "smoke.####.vdb",
           "smoke.####.esvr": "smoke.####.vdb", "ct.esvr": "ct.vdb", "fire.esvr": "fire.vdb",
           "20k.esvr": "smoke.vdb", "40k.esvr": "smoke.vdb", "80k.esvr": "smoke.vdb"}

@@ -1,11 +1,13 @@
 // Makes inputs of examples.
 //
-//   make_grids IN.vdb OUT.vdb NAME...   the first grid of a file under each name
+//   make_grids IN.vdb OUT.vdb NAME...   the first grid of a file under each name; every 50th voxel of one whose name
+//                                       ends in "_with_gaps" is NaN
 //   make_grids IN.raw OUT.vdb SIDE      a grid of SIDE^3 floats that follow each other with x fastest, all active
 
 #include <exception>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -18,9 +20,14 @@ namespace {
 void copyGrid(const char* from, const char* to, std::span<char*> names) {
   const esvr::VolumeGrid grid = esvr::readGrid(from, 0);
   std::vector<esvr::VolumeGrid> copies;
-  for (const char* name : names) {
+  for (const std::string name : names) {
     copies.push_back(grid);
     copies.back().descriptor.name = name;
+    constexpr std::size_t kStep = 50;
+    esvr::SparseVolume& volume = copies.back().volume;
+    for (std::size_t v = 0; name.ends_with("_with_gaps") && v < volume.values.size(); v += kStep)
+      if (volume.active[v / esvr::kBrickVoxels].test(int(v % esvr::kBrickVoxels)))
+        volume.values[v] = std::numeric_limits<float>::quiet_NaN();
   }
   esvr::writeGrids(to, {}, copies);
 }

@@ -87,7 +87,7 @@ TEST(HostileFile, ANewerMajorVersionIsRefusedByItsNumber) {
   file.versionMajor = format::kVersionMajor + 1;
   file.versionMinor = 3;
   EXPECT_THAT([&] { decode(file.assemble()); },
-              ThrowsMessage<BadInput>(AllOf(HasSubstr("format 2.3"), HasSubstr("knows 1.5"))));
+              ThrowsMessage<BadInput>(AllOf(HasSubstr("format 2.3"), HasSubstr("knows 1.6"))));
 }
 
 TEST(HostileFile, SectionsOfAnyOrderAreRead) {
@@ -160,7 +160,7 @@ const ContentLie kContentLies[] = {
     {"RequiredUnknownKind", [](CraftedFile& f) { f.add({K(kUnknownKind)}, format::kRequired, {}); },
      "must be understood"},
     {"UnknownCodec", setEntry(K::kCenters, [](Entry& e) { e.codec = Codec(4); }),
-     "codec 'unknown 0x4' of format 1.0, this reader knows 1.5"},
+     "codec 'unknown 0x4' of format 1.0, this reader knows 1.6"},
     {"UnknownFlag", setEntry(K::kCenters, [](Entry& e) { e.flags = 2; }), "flags 2"},
     {"LaterFrame", setEntry(K::kCenters, [](Entry& e) { e.id.frame = 1; }), "frame 1"},
     {"LaterLayer", setEntry(K::kCenters, [](Entry& e) { e.id.layer = 1; }), "layer 1"},

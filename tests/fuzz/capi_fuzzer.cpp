@@ -41,11 +41,13 @@ std::vector<double> placesFrom(const std::uint8_t* choice) {
           choice[0] + 0.0};
 }
 
-void readVolume(esvr_volume* volume, const std::vector<double>& places) {
+/// \param hasGaps  whether values may be NaN
+void readVolume(esvr_volume* volume, bool hasGaps, const std::vector<double>& places) {
   for (std::size_t b = 0; b < esvr_brick_count(volume); ++b) {
     esvr_brick brick{};
     require(esvr_get_brick(volume, b, &brick) == ESVR_OK);
-    for (std::size_t i = 0; i < ESVR_BRICK_VOXELS; ++i) require(!std::isnan(brick.values[i]));
+    for (std::size_t i = 0; i < ESVR_BRICK_VOXELS; ++i)
+      require(hasGaps || !std::isnan(brick.values[i]));
   }
   esvr_brick none{};
   require(esvr_get_brick(volume, esvr_brick_count(volume), &none) == ESVR_USAGE);
@@ -82,7 +84,7 @@ void readGrid(const esvr_file* file, std::size_t grid, const std::uint8_t* choic
       esvr_decode(file, grid, choice[3] & 2 ? box : nullptr, kMaxMemory, &volume);
   require(succeeded(status) == (volume != nullptr));
   const std::unique_ptr<esvr_volume, void (*)(esvr_volume*)> owned(volume, esvr_free_volume);
-  if (volume) readVolume(volume, places);
+  if (volume) readVolume(volume, description.nonfinite > 0, places);
 }
 
 }  // namespace

@@ -294,9 +294,16 @@ TEST(CompareVolumes, measuresARangeForPercentagesWithoutTheBackground) {
   EXPECT_EQ(valueRangeOf(volumeOf({{{0, 0, 0}, 5.0f}})), 0.0);
 }
 
-TEST(CompareVolumes, callsAnInfiniteValueBadInputAndNoWrongPeak) {
+TEST(CompareVolumes, leavesAnInfiniteValueOfBothOutOfTheErrorsAndThePeak) {
   const auto a = volumeOf({{{0, 0, 0}, 1.0f}, {{1, 0, 0}, std::numeric_limits<float>::infinity()}});
-  EXPECT_THROW((void)compareVolumes(a, a), BadInput);
+  const auto b = volumeOf({{{0, 0, 0}, 0.5f}, {{1, 0, 0}, std::numeric_limits<float>::infinity()}});
+  const VolumeMetrics m = compareVolumes(a, b);
+  EXPECT_EQ(m.nonFinite, 1u);
+  EXPECT_EQ(m.peak, 1.0);
+  EXPECT_EQ(m.boxVoxels, 1.0);
+  EXPECT_EQ(m.mseBox, 0.25);
+  EXPECT_EQ(m.mseActive, 0.25);
+  EXPECT_EQ(m.maxError, 0.5);
 }
 
 TEST(CompareVolumes, refusesAnEmptyBox) {

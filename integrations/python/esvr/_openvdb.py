@@ -36,11 +36,11 @@ def module_of(grid):
     return importlib.import_module(name)
 
 
-def volume_of(grid):
+def volume_of(grid, *, nonfinite="refuse"):
     """Makes a volume of a FloatGrid of OpenVDB's Python module (pyopenvdb, openvdb since OpenVDB 12).
 
     Name, class, background, transform, metadata, active voxels and their values are those of the grid. Active tiles
-    become voxels. Inactive voxels get the background.
+    become voxels. Inactive voxels get the background. nonfinite is that of Volume.from_numpy.
     """
     module = module_of(grid)
     if grid.valueTypeName not in NUMBERS:
@@ -50,7 +50,7 @@ def volume_of(grid):
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "grid.vdb")
         module.write(path, grids=[shared])
-        return Volume._from_only_grid(path)
+        return Volume._from_only_grid(path, nonfinite)
 
 
 def grid_of(volume):

@@ -12,6 +12,7 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
+#include "esvr/resolution.h"
 #include "esvr/sequence_file.h"
 #include "python/src/objects.h"
 
@@ -156,8 +157,11 @@ namespace {
 struct SavedPart {
   std::optional<PlainBox> box;
   std::optional<std::size_t> layers, maxEllipsoids;
+  SavedResolution resolution{};
 
-  [[nodiscard]] bool isWhole() const { return !box && !layers && !maxEllipsoids; }
+  [[nodiscard]] bool isWhole() const {
+    return !box && !layers && !maxEllipsoids && !resolution.coarsen && !resolution.voxelSize;
+  }
 };
 
 using Decoded = std::variant<VolumeGrid, VectorGrid>;
@@ -181,13 +185,16 @@ Decoded decode(const EsvrFile& file, const GridOfFile& grid, const SavedPart& pa
   const DecodeOptions options = decodeOptions(part);
   if (!grid.isVector) {
     const StoredGrid& stored = file.grids[grid.index];
-    return VolumeGrid{stored.descriptor, decodeGrid(cut(stored, part), options)};
+    const double factor = factorOf(stored.descriptor.transform, part.resolution);
+    return decodeAtResolution(cut(stored, part), factor, options);
   }
   const StoredVector& vector = file.vectors[grid.index];
   std::vector<StoredGrid> parts;
   for (const StoredGrid& component : componentsOf(file, vector))
     parts.push_back(cut(component, part));
-  return decodeVector(vector.name, std::span(parts).first<kComponents>(), options);
+  const double factor = factorOf(parts.front().descriptor.transform, part.resolution);
+  return decodeVectorAtResolution(vector.name, std::span(parts).first<kComponents>(), factor,
+                                  options);
 }
 
 /// The grids that are written, in their order, and the names of the others.
@@ -258,18 +265,22 @@ void addFiles(py::module_& module) {
           "save",
           [](const File& file, const std::filesystem::path& path,
              const std::optional<PlainBox>& box, const std::optional<std::size_t>& layers,
-             const std::optional<std::size_t>& maxEllipsoids, bool overwrite) {
+             const std::optional<std::size_t>& maxEllipsoids, std::optional<double> coarsen,
+             std::optional<double> voxelSize, bool overwrite) {
             return interruptible([&] {
-              return saveFile(file, path, {box, layers, maxEllipsoids}, overwrite);
+              return saveFile(file, path, {box, layers, maxEllipsoids, {coarsen, voxelSize}},
+                              overwrite);
             });
           },
           py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
           py::arg("layers") = py::none(), py::arg("max_ellipsoids") = py::none(),
+          py::arg("coarsen") = py::none(), py::arg("voxel_size") = py::none(),
           py::arg("overwrite") = false,
           "Writes the voxels of all grids to a .vdb or .nvdb file, as esvr2vdb does.\n\n"
           "box ((x0, y0, z0), (x1, y1, z1)), layers and max_ellipsoids are --bbox, --lod and\n"
-          "--max-ellipsoids of esvr2vdb. With one of them, carried grids are left out, because\n"
-          "they cannot be cut. Returns the names of the grids that were left out.")
+          "--max-ellipsoids of esvr2vdb; coarsen and voxel_size are those of Grid.to_volume. With\n"
+          "one of them, carried grids are left out, because they cannot be cut. Returns the names "
+          "of the grids that were left out.")
       .def(
           "__len__", [](const File& f) { return f.file->grids.size(); }, "The number of grids.")
       .def("__repr__", [](const File& f) { return describe(f); });

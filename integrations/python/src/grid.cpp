@@ -17,6 +17,7 @@
 #include "esvr/field.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
+#include "esvr/resolution.h"
 #include "python/src/objects.h"
 
 namespace esvr::python {
@@ -74,7 +75,7 @@ py::array_t<float> evaluate(const Grid& self, const Places& points) {
   if (!followsFromEllipsoids(grid))
     throw UsageError(
         "grid '" + shownName(grid.descriptor.name) +
-        "' stores voxels or a residual, so that there is no sum to evaluate; decode it "
+        "' stores voxels, a residual or NaN, so that there is no sum to evaluate; decode it "
         "with to_volume()");
   py::array_t<float> values(points.shape(0));
   const std::span places(reinterpret_cast<const Place*>(points.data()),
@@ -122,24 +123,42 @@ void addEllipsoids(py::module_& module) {
 
 }  // namespace
 
+double factorOf(const Transform& transform, const SavedResolution& wish) {
+  if (wish.coarsen && wish.voxelSize) throw UsageError("coarsen and voxel_size exclude each other");
+  if (wish.coarsen && !(*wish.coarsen >= 1.0)) throw UsageError("coarsen must be 1 or above");
+  if (wish.voxelSize && !(*wish.voxelSize > 0.0)) throw UsageError("voxel_size must be above 0");
+  return wish.voxelSize ? factorFor(transform, *wish.voxelSize) : wish.coarsen.value_or(1.0);
+}
+
 Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
-               const std::optional<std::uint64_t>& maxMemory) {
+               const std::optional<std::uint64_t>& maxMemory, const SavedResolution& resolution) {
   DecodeOptions options{.maxBytes = memoryLimit(maxMemory)};
   if (box) options.box = boxOf(*box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
   return interruptible([&] {
-    return Volume{std::make_shared<const VolumeGrid>(
-        VolumeGrid{grid.grid->descriptor, decodeGrid(*grid.grid, options)})};
+    return Volume{std::make_shared<const VolumeGrid>(decodeAtResolution(
+        *grid.grid, factorOf(grid.grid->descriptor.transform, resolution), options))};
   });
 }
 
 void addGrid(py::module_& module) {
   addEllipsoids(module);
   py::class_<Grid>(module, "Grid", "A grid of an .esvr file: a sum of ellipsoids, or voxels.")
-      .def("to_volume", &decoded, py::arg("box") = py::none(), py::kw_only(),
-           py::arg("max_memory") = py::none(),
-           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
-           "max_memory is that of esvr.read.")
+      .def(
+          "to_volume",
+          [](const Grid& grid, const std::optional<PlainBox>& box,
+             const std::optional<std::uint64_t>& maxMemory, std::optional<double> coarsen,
+             std::optional<double> voxelSize) {
+            return decoded(grid, box, maxMemory, {coarsen, voxelSize});
+          },
+          py::arg("box") = py::none(), py::kw_only(), py::arg("max_memory") = py::none(),
+          py::arg("coarsen") = py::none(), py::arg("voxel_size") = py::none(),
+          "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
+          "max_memory is that of esvr.read. coarsen is a factor from 1 to 1024 by which the edges "
+          "of\n"
+          "voxels become longer, each with the average of what is in it; voxel_size is the length\n"
+          "of their shortest edge instead, in units of the world, and may be shorter than in the\n"
+          "source for ellipsoids. The box is in voxels of the source.")
       .def("evaluate", &evaluate, py::arg("points"),
            "The sum of the ellipsoids at points of shape (n, 3), in index coordinates: float32 of\n"
            "shape (n,). A fit constrains it at voxels only.")
@@ -168,7 +187,10 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "value_range",
           [](const Grid& g) { return std::pair(g.grid->valueMin, g.grid->valueMax); },
-          "The smallest and the largest active value of the source.")
+          "The smallest and the largest finite active value of the source.")
+      .def_property_readonly(
+          "nonfinite", [](const Grid& g) { return g.grid->nonFinite.total(); },
+          "Number of active voxels of the source that are NaN or infinite, and come back so.")
       .def_property_readonly(
           "tone",
           [](const Grid& g) {
@@ -315,9 +337,16 @@ bool isLossless(const ConvertOptions& options) {
   return std::holds_alternative<LosslessGoal>(options.goal);
 }
 
-FileSource sourceOf(const ConvertedSource& given, bool lossless) {
+/// Refuses volumes with voxels that are not finite, unless they are to be kept.
+void requireFinite(const Volume& volume, NonFinite nonFinite) {
+  if (nonFinite != NonFinite::kKeep && hasNonFinite(volume.grid->volume))
+    throw BadInput("grid '" + shownName(volume.grid->descriptor.name) +
+                   "' has voxels that are not finite; nonfinite='keep' keeps them");
+}
+
+FileSource sourceOf(const ConvertedSource& given, bool lossless, NonFinite nonFinite) {
   if (const auto* path = std::get_if<std::filesystem::path>(&given))
-    return readSources(*path, lossless, {.maxBytes = usualMemoryLimit()});
+    return readSources(*path, lossless, {.nonFinite = nonFinite, .maxBytes = usualMemoryLimit()});
   FileSource source;
   for (const auto& [grid, rounded] : std::get<std::vector<Volume>>(given)) {
     const std::uint64_t active = activeVoxelCount(grid->volume);
@@ -331,17 +360,19 @@ FileSource sourceOf(const ConvertedSource& given, bool lossless) {
   return source;
 }
 
-File convertSource(const ConvertedSource& given, const ConvertOptions& options,
-                   const Progress& progress) {
+File convertSource(const ConvertedSource& given, const ConvertOptions& options, NonFinite nonFinite,
+                   const Progress& progress) try {
   ConvertedFile made = reporting(options, progress, [&](const ConvertOptions& common) {
     FileOptions ofFile{.convert = common};
     if (const auto* size = std::get_if<SizeGoal>(&common.goal)) ofFile.size = size->bytes;
-    return convertGrids(sourceOf(given, isLossless(common)), ofFile);
+    return convertGrids(sourceOf(given, isLossless(common), nonFinite), ofFile);
   });
   if (made.interrupted) throw Cancelled();
   if (std::holds_alternative<PsnrGoal>(options.goal))  // a preset is as good as the grids allow
     for (const GridConversion& grid : made.grids) requirePsnr(grid.conversion);
   return {std::make_shared<const EsvrFile>(std::move(made.file))};
+} catch (const NotFinite& error) {
+  throw BadInput(error.what() + std::string("; nonfinite='keep' stores where they are"));
 }
 
 /// Warns of what a grid without loss does not hold.
@@ -380,6 +411,9 @@ constexpr const char* kGoalText =
     "tone: the scale of the tone curve; None: it is chosen where the measure is what is seen; 0: "
     "none.\n"
     "effort: how long the conversion may take, from 1 to 9.\n"
+    "nonfinite: 'refuse' NaN and infinite voxels, or 'keep' them: they come back where they were, "
+    "and\n"
+    "the goal and all errors are those of the other voxels.\n"
     "representation: 'auto', 'ellipsoids' or 'voxels'. storage: 'compact' or 'float32'. device:\n"
     "'auto', 'cpu', 'cuda' or 'cuda:N'. progress: is called with the share of the running fit "
     "that\n"
@@ -401,8 +435,8 @@ void defineConversion(py::module_& module, const char* name, const char* source,
                     std::optional<std::uint64_t> size, std::optional<std::size_t> count,
                     bool lossless, const std::string& preset, const std::string& measure,
                     std::optional<float> tone, int effort, const std::string& representation,
-                    const std::string& storage, const std::string& device, std::uint64_t seed,
-                    const Progress& progress) {
+                    const std::string& storage, const std::string& nonFinite,
+                    const std::string& device, std::uint64_t seed, const Progress& progress) {
         ConvertOptions options;
         options.goal = goalOf(
             {psnr, picturePsnr, maxError, maxRelativeError, relativeFloor, size, count, lossless});
@@ -421,7 +455,7 @@ void defineConversion(py::module_& module, const char* name, const char* source,
         options.fit.count = count;
         options.fit.seed = seed;
         options.fit.device = selectDevice(device);
-        return convertFrom(from, options, progress);
+        return convertFrom(from, options, nonFiniteOf(nonFinite), progress);
       },
       py::arg(source), py::kw_only(), py::arg("psnr") = py::none(),
       py::arg("picture_psnr") = py::none(), py::arg("max_error") = py::none(),
@@ -429,26 +463,31 @@ void defineConversion(py::module_& module, const char* name, const char* source,
       py::arg("size") = py::none(), py::arg("count") = py::none(), py::arg("lossless") = false,
       py::arg("preset") = "standard", py::arg("measure") = "auto", py::arg("tone") = py::none(),
       py::arg("effort") = kUsualEffort, py::arg("representation") = "auto",
-      py::arg("storage") = "compact", py::arg("device") = "auto", py::arg("seed") = 1,
-      py::arg("progress") = py::none(), (std::string(text) + kGoalText).c_str());
+      py::arg("storage") = "compact", py::arg("nonfinite") = "refuse", py::arg("device") = "auto",
+      py::arg("seed") = 1, py::arg("progress") = py::none(),
+      (std::string(text) + kGoalText).c_str());
 }
 
 }  // namespace
 
 void addFit(py::module_& module) {
-  defineConversion<Volume>(
-      module, "fit", "volume", kFitText,
-      [](const Volume& volume, const ConvertOptions& options, const Progress& progress) {
-        if (isLossless(options)) tellLostValues(volume);
-        return fitVolume(volume, options, progress);
-      });
+  defineConversion<Volume>(module, "fit", "volume", kFitText,
+                           [](const Volume& volume, const ConvertOptions& options,
+                              NonFinite nonFinite, const Progress& progress) {
+                             requireFinite(volume, nonFinite);
+                             if (isLossless(options)) tellLostValues(volume);
+                             return fitVolume(volume, options, progress);
+                           });
   defineConversion<ConvertedSource>(
       module, "convert", "source", kConvertText,
-      [](const ConvertedSource& source, const ConvertOptions& options, const Progress& progress) {
+      [](const ConvertedSource& source, const ConvertOptions& options, NonFinite nonFinite,
+         const Progress& progress) {
         if (const auto* volumes = std::get_if<std::vector<Volume>>(&source); volumes)
-          for (const Volume& volume : *volumes)
+          for (const Volume& volume : *volumes) {
+            requireFinite(volume, nonFinite);
             if (isLossless(options)) tellLostValues(volume);
-        return convertSource(source, options, progress);
+          }
+        return convertSource(source, options, nonFinite, progress);
       });
 }
 

@@ -102,11 +102,22 @@ using Matrix = std::array<std::array<double, 4>, 4>;
 /// The matrix from index to world coordinates, for column vectors; None for a frustum.
 [[nodiscard]] py::object matrixOf(const Transform& transform);
 
+/// What the argument `nonfinite` says. \throws UsageError  it is neither 'refuse' nor 'keep'
+[[nodiscard]] NonFinite nonFiniteOf(const std::string& word);
+
+/// The arguments `coarsen` and `voxel_size`.
+struct SavedResolution {
+  std::optional<double> coarsen{}, voxelSize{};
+};
+/// The factor of esvr/resolution.h. \throws UsageError  an argument is out of range, or both are given
+[[nodiscard]] double factorOf(const Transform& transform, const SavedResolution& wish);
+
 /// The voxels of a stored grid, with the GIL released.
-/// \throws UsageError  the box is empty
+/// \throws UsageError  the box is empty; as for factorOf
 /// \throws MemoryExceeded  they need more than the limit
 [[nodiscard]] Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
-                             const std::optional<std::uint64_t>& maxMemory = std::nullopt);
+                             const std::optional<std::uint64_t>& maxMemory = std::nullopt,
+                             const SavedResolution& resolution = {});
 
 /// Waits for a call on another thread with the GIL released. A signal that Python turns into an
 /// exception sets the token; the exception is thrown when the call has ended.

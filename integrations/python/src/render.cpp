@@ -110,8 +110,12 @@ py::array_t<std::uint8_t> drawn(const Look& look, const Subject& subject, const 
   return bytesOf(image, look);
 }
 
+/// Voxels that are not finite are empty.
 py::array_t<std::uint8_t> drawVolume(const Volume& self, const Look& look) {
-  const SparseVolume& volume = self.grid->volume;
+  const bool areFinite = !hasNonFinite(self.grid->volume);
+  SparseVolume finite;
+  if (!areFinite) finite = self.grid->volume, dropNonFinite(finite);
+  const SparseVolume& volume = areFinite ? self.grid->volume : finite;
   const GridDescriptor& grid = self.grid->descriptor;
   return drawn(look, {activeBox(volume), lookBasis(grid, volume), voxelOf(grid)},
                [&](const Device& device) { return makeVolumeRenderer(volume, device); });

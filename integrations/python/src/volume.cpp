@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -24,6 +25,7 @@ struct Dense {
   const bool* active;  ///< null: values say which voxels are active
   Coord side;
   Box box;
+  bool keepsNonFinite = false;
 
   [[nodiscard]] std::size_t placeOf(Coord voxel) const {
     const Coord v = voxel - box.min;
@@ -131,7 +133,7 @@ Numbers numbersOf(const py::object& given, const Corner& origin) {
 }
 
 /// A voxel of the array is active if it is not masked, and if the caller says so, or else if it differs from
-/// the background by more than the threshold.
+/// the background by more than the threshold. NaN and infinities are active.
 BrickInput brickOfArray(const Dense& dense, Coord corner, float background, float threshold) {
   BrickInput brick{corner, {}, {}};
   brick.values.fill(background);
@@ -142,8 +144,14 @@ BrickInput brickOfArray(const Dense& dense, Coord corner, float background, floa
     if (dense.masked != nullptr && dense.masked[place]) continue;
     if (dense.active != nullptr && !dense.active[place]) continue;
     const float value = dense.values[place];
-    if (!std::isfinite(value))
-      throw BadInput("the value of voxel " + toString(voxel) + " is not finite");
+    if (!std::isfinite(value)) {
+      if (!dense.keepsNonFinite)
+        throw BadInput("the value of voxel " + toString(voxel) +
+                       " is not finite; nonfinite='keep' keeps such values");
+      brick.values[i] = std::isnan(value) ? std::numeric_limits<float>::quiet_NaN() : value;
+      brick.active.set(i);
+      continue;
+    }
     if (dense.active == nullptr && !(std::abs(value - background) > threshold)) continue;
     brick.values[i] = value;
     brick.active.set(i);
@@ -175,6 +183,7 @@ struct ArrayOptions {
   std::string name;
   GridClass gridClass;
   std::vector<MetaItem> metadata;
+  NonFinite nonFinite = NonFinite::kRefuse;
 };
 
 /// The transform of a voxel size or of a matrix, of which one may be given.
@@ -224,7 +233,8 @@ Volume fromNumpy(const py::object& array, const ArrayOptions& options) {
                     .masked = numbers.masked ? numbers.masked->data() : nullptr,
                     .active = options.active ? options.active->data() : nullptr,
                     .side = side,
-                    .box = {first, first + (side - Coord{1, 1, 1})}};
+                    .box = {first, first + (side - Coord{1, 1, 1})},
+                    .keepsNonFinite = options.nonFinite == NonFinite::kKeep};
   const py::gil_scoped_release release;
   auto grid = std::make_shared<VolumeGrid>();
   grid->descriptor.name = options.name;
@@ -297,11 +307,17 @@ std::size_t firstOfNumbers(const std::filesystem::path& path) {
 constexpr const char* kWayOut =
     "; the program vdb2esvr carries such a grid of a .vdb file unchanged (--keep NAME)";
 
-Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name) {
+constexpr const char* kKeepsThem = "; nonfinite='keep' keeps such values";
+
+Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name,
+               NonFinite nonFinite) {
+  const ReadOptions read{.nonFinite = nonFinite};
   return interruptible([&] {
     try {
       return Volume{std::make_shared<const VolumeGrid>(
-          name ? readGrid(path, *name) : readGrid(path, firstOfNumbers(path)))};
+          name ? readGrid(path, *name, read) : readGrid(path, firstOfNumbers(path), read))};
+    } catch (const NotFinite& error) {
+      throw BadInput(error.what() + std::string(kKeepsThem) + kWayOut);
     } catch (const CannotConvert& error) {
       throw BadInput(error.what() + std::string(kWayOut));
     } catch (const MemoryExceeded& error) {
@@ -311,10 +327,15 @@ Volume fromVdb(const std::filesystem::path& path, const std::optional<std::strin
 }
 
 /// The only grid of a file, which may have no active voxel.
-Volume fromOnlyGrid(const std::filesystem::path& path) {
+Volume fromOnlyGrid(const std::filesystem::path& path, NonFinite nonFinite) {
   return interruptible([&] {
     constexpr std::size_t kOnly = 0;
-    return Volume{std::make_shared<const VolumeGrid>(readGrid(path, kOnly, {.allowEmpty = true}))};
+    try {
+      return Volume{std::make_shared<const VolumeGrid>(
+          readGrid(path, kOnly, {.nonFinite = nonFinite, .allowEmpty = true}))};
+    } catch (const NotFinite& error) {
+      throw BadInput(error.what() + std::string(kKeepsThem));
+    }
   });
 }
 
@@ -325,7 +346,19 @@ void write(const Volume& self, const std::filesystem::path& path, const WriteOpt
   });
 }
 
+std::uint64_t nonFiniteCount(const SparseVolume& volume) {
+  std::uint64_t count = 0;
+  for (const float value : volume.values) count += !std::isfinite(value);
+  return count;
+}
+
 }  // namespace
+
+NonFinite nonFiniteOf(const std::string& word) {
+  if (word == "refuse") return NonFinite::kRefuse;
+  if (word == "keep") return NonFinite::kKeep;
+  throw UsageError("nonfinite is one of refuse, keep, not '" + word + "'");
+}
 
 void addVolume(py::module_& module) {
   py::class_<Volume>(module, "Volume",
@@ -335,17 +368,18 @@ void addVolume(py::module_& module) {
           [](const py::object& array, float background, const Corner& origin, float threshold,
              const std::optional<double>& voxelSize, const std::string& name, bool levelSet,
              const std::optional<FlagArray>& active, const std::optional<Matrix>& transform,
-             const std::string& gridClass, const py::dict& metadata) {
+             const std::string& gridClass, const py::dict& metadata, const std::string& nonFinite) {
             return fromNumpy(
-                array, {background, threshold, origin, active, transformOf(voxelSize, transform),
-                        name, classOf(gridClass, levelSet), itemsOf(metadata)});
+                array,
+                {background, threshold, origin, active, transformOf(voxelSize, transform), name,
+                 classOf(gridClass, levelSet), itemsOf(metadata), nonFiniteOf(nonFinite)});
           },
           py::arg("array"), py::kw_only(), py::arg("background") = 0.0f,
           py::arg("origin") = Corner{}, py::arg("threshold") = 0.0f,
           py::arg("voxel_size") = py::none(), py::arg("name") = "density",
           py::arg("level_set") = false, py::arg("active") = py::none(),
           py::arg("transform") = py::none(), py::arg("grid_class") = "fog volume",
-          py::arg("metadata") = py::dict(),
+          py::arg("metadata") = py::dict(), py::arg("nonfinite") = "refuse",
           "Makes a volume from an array of shape (nx, ny, nz), converted to float32.\n\n"
           "A voxel is active if it differs from the background by more than the threshold, or, "
           "with\n"
@@ -357,13 +391,18 @@ void addVolume(py::module_& module) {
           "origin is the voxel of array[0, 0, 0]. voxel_size is in world units (default: 1);\n"
           "transform is the 4 x 4 matrix from index to world coordinates, for column vectors.\n"
           "grid_class is 'fog volume' or 'unknown'. metadata has texts, numbers, truth values and\n"
-          "tuples of three integers or floats.")
+          "tuples of three integers or floats. nonfinite is 'refuse', or 'keep': NaN and\n"
+          "infinities are active voxels.")
       .def_static(
-          "from_vdb", &fromVdb, py::arg("path"), py::arg("grid") = py::none(),
+          "from_vdb",
+          [](const std::filesystem::path& path, const std::optional<std::string>& name,
+             const std::string& nonFinite) { return fromVdb(path, name, nonFiniteOf(nonFinite)); },
+          py::arg("path"), py::arg("grid") = py::none(), py::kw_only(),
+          py::arg("nonfinite") = "refuse",
           "Reads a grid of numbers of a .vdb or .nvdb file; the first one by default. It is named\n"
           "as for --grid of the programs: \"density[1]\" is the second grid of a name, \"vel.x\" "
           "a\n"
-          "component of vectors.")
+          "component of vectors. nonfinite is that of from_numpy.")
       .def("to_numpy", &toNumpy, py::arg("box") = py::none(),
            "The voxels of a box ((x0, y0, z0), (x1, y1, z1)), both inclusive, as float32 of shape\n"
            "(nx, ny, nz); by default those of Volume.box.")
@@ -377,7 +416,12 @@ void addVolume(py::module_& module) {
           py::arg("path"), py::kw_only(), py::arg("overwrite") = false,
           "Writes a .vdb or .nvdb file with this grid.")
       // For esvr/_openvdb.py.
-      .def_static("_from_only_grid", &fromOnlyGrid, py::arg("path"))
+      .def_static(
+          "_from_only_grid",
+          [](const std::filesystem::path& path, const std::string& nonFinite) {
+            return fromOnlyGrid(path, nonFiniteOf(nonFinite));
+          },
+          py::arg("path"), py::arg("nonfinite"))
       .def(
           "_save_as_float",
           [](const Volume& v, const std::filesystem::path& path) {
@@ -395,6 +439,9 @@ void addVolume(py::module_& module) {
       .def_property_readonly(
           "active_voxels", [](const Volume& v) { return activeVoxelCount(v.grid->volume); },
           "Number of active voxels.")
+      .def_property_readonly(
+          "nonfinite", [](const Volume& v) { return nonFiniteCount(v.grid->volume); },
+          "Number of active voxels that are NaN or infinite.")
       .def_readonly("rounded_values", &Volume::roundedValues,
                     "Number of active voxels of from_numpy whose float32 differs from the element.")
       .def_property_readonly(
@@ -412,7 +459,8 @@ void addVolume(py::module_& module) {
             const ValueRange range = activeRange(v.grid->volume);
             return std::pair(range.min, range.max);
           },
-          "The smallest and the largest active value; None if there is none. Their difference is "
+          "The smallest and the largest finite active value; None if there is none. Their "
+          "difference is "
           "the\n"
           "range of which --max-error takes a percentage.")
       .def_property_readonly(

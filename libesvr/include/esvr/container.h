@@ -49,6 +49,14 @@ struct VoxelReference {
   friend bool operator==(const VoxelReference&, const VoxelReference&) = default;
 };
 
+/// Numbers of voxels that are NaN or infinite.
+struct NonFiniteCounts {
+  std::uint64_t nan = 0, plusInfinity = 0, minusInfinity = 0;
+
+  [[nodiscard]] std::uint64_t total() const { return nan + plusInfinity + minusInfinity; }
+  friend bool operator==(const NonFiniteCounts&, const NonFiniteCounts&) = default;
+};
+
 /// One grid of a file.
 struct StoredGrid {
   GridDescriptor descriptor;
@@ -86,6 +94,14 @@ struct StoredGrid {
   std::optional<VoxelLayer> voxels;
   /// How the voxels are coded. A reader gets the same voxels with and without it.
   std::optional<VoxelReference> reference;
+  /// Active voxels of the source that are NaN or infinite (NonFinite::kKeep, vdb_io.h). The sum of ellipsoids and
+  /// `voxels` have finite values there, which decodeGrid() replaces; `valueMin` and `valueMax` are those of the
+  /// other voxels.
+  NonFiniteCounts nonFinite;
+  /// Where they are: a layer of kPalette in which only they are active, and all others vacant. Its palette has 0 for
+  /// the vacant ones, and 1 for NaN, 2 for plus and 3 for minus infinity, as far as there are any. There if
+  /// `nonFinite` counts any, except in a grid of which a part of a file has the record only.
+  std::optional<VoxelLayer> nonFiniteVoxels;
 };
 
 /// Bytes of each stream of a grid's quantised ellipsoids.

@@ -95,7 +95,7 @@ struct GridConversion {
   std::optional<std::size_t> twinOf{};  ///< `convertedAs` if that is another grid of the file
   bool asBefore = false;                ///< it is the grid of the previous frame
   std::size_t bricks = 0;               ///< of the source, as the next two
-  std::uint64_t nonFiniteReplaced = 0;
+  std::uint64_t nonFiniteReplaced = 0;  ///< with NonFinite::kValue or kBackground
   InactiveValues inactive{};
   double secondsRead = 0.0, secondsConvert = 0.0;
 

@@ -160,6 +160,9 @@ struct ConvertOptions {
   /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal and a PsnrGoal, so that
   /// only the first frame of a group takes the time of a fit.
   const StoredGrid* previous = nullptr;
+  /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
+  /// convertVolume() where the source has values that are not finite.
+  std::uint64_t filledVoxels = 0;
   /// Voxels keep a part of the errors of the previous frame, if there is one. Errors that stay in
   /// their places flicker less, for a few bytes more. It is false where `previous` is another grid.
   bool keepsPastErrors = true;
@@ -252,6 +255,8 @@ struct Conversion {
 /// A volume whose background is far from its values (spanOf, volume.h) is converted relative
 /// to a value among them, with its exact mask whatever StorageOptions::activity says, unless the goal
 /// is lossless (StoredGrid::farBackground).
+/// Active voxels that are NaN or infinite are kept (StoredGrid::nonFinite): the volume is converted with values there
+/// that take few bytes, and every goal is meant for the other voxels.
 /// Values that differ from the background by more than 2^120 (1.3e36) are too large for sums in
 /// float32; such a grid is stored as voxels.
 /// \throws BadInput  values are too large for sums, and the goal or an option needs ellipsoids (the

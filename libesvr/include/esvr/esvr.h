@@ -85,6 +85,7 @@ typedef struct esvr_grid {
   uint64_t ellipsoids;     ///< 0: the voxels themselves are stored
   int32_t has_residual;    ///< voxels are the sum of the ellipsoids and a correction
   float tone;              ///< s above 0: a value is s sinh(sum / s) of the sum; 0: it is the sum
+  uint64_t nonfinite;      ///< active voxels that are NaN or infinite, and come back so
 } esvr_grid;
 
 /// Describes a grid.
@@ -107,7 +108,7 @@ esvr_status esvr_get_ellipsoids(const esvr_file* file, size_t grid, uint64_t fir
 
 /// Evaluates the sum of a grid's ellipsoids, as a value by the tone curve if there is one, and clamped to the range of the source where the file says
 /// so, at any places. A fit constrains the sum at voxels only; esvr_sample interpolates between them.
-/// ESVR_USAGE for a grid that stores voxels or a residual; esvr_sample serves those.
+/// ESVR_USAGE for a grid that stores voxels, a residual or voxels that are not finite; esvr_sample serves those.
 /// \param places  x, y and z of each place
 /// \param values  output, one for each place
 esvr_status esvr_evaluate(const esvr_file* file, size_t grid, size_t count, const double* places,
@@ -141,7 +142,8 @@ typedef struct esvr_brick {
 /// \param brick  number of the brick; bricks are in increasing order of x, y and z
 esvr_status esvr_get_brick(const esvr_volume* volume, size_t brick, esvr_brick* description);
 
-/// Interpolates the voxels of a volume trilinearly. The value is the background outside of it.
+/// Interpolates the voxels of a volume trilinearly. The value is the background outside of it, and not finite beside a
+/// voxel that is not.
 /// \param places  x, y and z of each place
 /// \param values  output, one for each place
 esvr_status esvr_sample(const esvr_volume* volume, size_t count, const double* places,

@@ -55,7 +55,7 @@ namespace esvr {
 [[nodiscard]] RevoxeliseOptions voxelRule(const StoredGrid& grid);
 
 /// True if the voxels of a grid follow from its ellipsoids by voxelRule() alone. This is not so if
-/// it stores voxels or a residual, or if its inactive voxels have a far background.
+/// it stores voxels, a residual or voxels that are not finite, or if its inactive voxels have a far background.
 [[nodiscard]] bool followsFromEllipsoids(const StoredGrid& grid);
 
 struct DecodeOptions {
@@ -67,6 +67,8 @@ struct DecodeOptions {
   /// Limit on the memory of the evaluation and its result. Voxels in a file do not count.
   std::uint64_t maxBytes = kNoMemoryLimit;
   VoxelMemory memory{};  ///< holds the voxels
+  /// False: voxels that are NaN or infinite come back as empty ones (dropNonFinite, volume.h), as drawing takes them.
+  bool keepsNonFinite = true;
 };
 
 /// Estimates the work and memory that decodeGrid() takes at most. Nothing is evaluated.
@@ -75,7 +77,7 @@ struct DecodeOptions {
 
 /// The voxels that a stored grid represents. If the source was saved as half (ValueType::kHalf), the
 /// active voxels are halfs (roundToHalfs, quantised.h), so that a .vdb file of them has the same
-/// values and keeps the same bound.
+/// values and keeps the same bound. Voxels that the source had as NaN or infinite are that again, and active.
 /// \throws UsageError  the threshold is negative or not finite, or the grid stores voxels or has a far
 ///                     background, so that it says itself which voxels are active
 /// \throws MemoryExceeded  the estimate is above options.maxBytes; nothing was evaluated

@@ -73,7 +73,8 @@ struct CompareOptions {
 struct VolumeMetrics {
   double peak = 0.0;
   double boxVoxels = 0.0;
-  std::uint64_t activeVoxels = 0;  ///< active voxels of the reference
+  std::uint64_t activeVoxels = 0;  ///< active voxels of the reference that are finite
+  std::uint64_t nonFinite = 0;     ///< voxels of both volumes that are equal and not finite
   double mseBox = 0.0, mseActive = 0.0;
   double psnrBox = 0.0, psnrActive = 0.0;  ///< dB; +inf if the error is zero
   double maxError = 0.0;                   ///< largest absolute error over the box
@@ -85,11 +86,12 @@ struct VolumeMetrics {
   std::optional<TransmittancePsnr> transmittance;  ///< of a reference that lets light through
 };
 
-/// Compares two volumes. Voxels outside the box affect `iou`, `psnrActive` and `p999Error` only.
+/// Compares two volumes. Where both have NaN, or the same infinity, at an active voxel, the voxel counts in no figure, and
+/// where all voxels of the box do, the errors are 0. Voxels outside the box affect `iou`, `psnrActive` and `p999Error` only.
 /// p999Error is the nearest-rank percentile: the smallest error that 99.9 % of the voxels do not
 /// exceed. The result is bit-identical for any number of threads.
-/// \throws BadInput  the reference has no active voxel; a value is not finite (the text names the
-///                   voxel)
+/// \throws BadInput  the reference has no active voxel; a value of one volume is NaN or infinite, and that of the other
+///                   one is something else (the text names the voxel and both)
 /// \throws UsageError  the box is empty, or the given peak is not positive
 [[nodiscard]] VolumeMetrics compareVolumes(const SparseVolume& reference,
                                            const SparseVolume& candidate,

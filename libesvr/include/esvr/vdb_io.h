@@ -59,9 +59,10 @@ struct VdbSummary {
 ///                   names the file)
 [[nodiscard]] VdbSummary inspectVdb(const std::filesystem::path& path);
 
-/// Treatment of active voxels that are NaN, infinite or too large for float: they are an error, or
-/// they get a value or the background of their grid (of a vector: of the component).
-enum class NonFinite { kRefuse, kValue, kBackground };
+/// Treatment of active voxels that are NaN, infinite or too large for float: they are an error, or they get a value or
+/// the background of their grid (of a vector: of the component), or NaN and infinities stay what they are. In that case
+/// only doubles that are finite but too large for float are an error.
+enum class NonFinite { kRefuse, kValue, kBackground, kKeep };
 
 struct ReadOptions {
   NonFinite nonFinite = NonFinite::kRefuse;

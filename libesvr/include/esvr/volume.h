@@ -182,6 +182,7 @@ struct BrickMask {
     return (words[offset >> 6] >> (offset & 63)) & 1u;
   }
   void set(int offset) { words[offset >> 6] |= std::uint64_t{1} << (offset & 63); }
+  void reset(int offset) { words[offset >> 6] &= ~(std::uint64_t{1} << (offset & 63)); }
   void setAll() { words.fill(~std::uint64_t{0}); }
   [[nodiscard]] int count() const {
     int n = 0;
@@ -265,9 +266,19 @@ struct ValueRange {
     max = std::max(max, r.max);
   }
 };
-/// Smallest and largest value of the active voxels.
+/// Smallest and largest finite value of the active voxels; both the background if none is finite.
 /// \throws BadInput  there is no active voxel
 [[nodiscard]] ValueRange activeRange(const SparseVolume& volume);
+
+// Values that are missing. A reader that is asked to keep them (NonFinite::kKeep, vdb_io.h) and a decoder
+// return volumes with active voxels that are NaN or infinite. Whatever computes with values leaves them out.
+
+/// True if a voxel of the bricks is NaN or infinite.
+[[nodiscard]] bool hasNonFinite(const SparseVolume& volume);
+
+/// Makes voxels that are NaN or infinite inactive and gives them the background, so that they are empty. Bricks
+/// remain, even if no voxel of them is active any more.
+void dropNonFinite(SparseVolume& volume);
 
 /// The interval over which the values of a grid spread, active or not.
 struct ValueSpan {

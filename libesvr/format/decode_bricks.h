@@ -1,0 +1,22 @@
+#pragma once
+/// Decodes some bricks of a grid, so that a volume which is larger than the memory can be looked at piece by piece.
+
+#include <span>
+#include <vector>
+
+#include "esvr/grid_coding.h"
+
+namespace esvr::format {
+
+/// Index corners, increasing, of the bricks in which decodeGrid() may return an active voxel.
+/// \throws MemoryExceeded  as for reachedBricks (field.h)
+[[nodiscard]] std::vector<Coord> decodedBricks(const StoredGrid& grid,
+                                               const DecodeOptions& options);
+
+/// The voxels of decodeGrid() in these bricks; `options.maxBytes` is ignored.
+/// \param bricks  increasing corners
+/// \throws UsageError  as for decodeGrid
+[[nodiscard]] SparseVolume decodeBricks(const StoredGrid& grid, const DecodeOptions& options,
+                                        std::span<const Coord> bricks);
+
+}  // namespace esvr::format

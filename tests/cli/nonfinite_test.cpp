@@ -1,0 +1,233 @@
+// Plan: files with NaN and infinite voxels go through the converters as users run them. They are refused with the option
+// that keeps them, and with it they come back where they were, as floats, halfs and doubles, as components of vectors, in
+// level sets, in .vdb and .nvdb files, in twins and in sequences. Reports and lists count them, comparisons leave them
+// out, and pictures show them as empty.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "cli/converters.h"
+#include "esvr/grid_coding.h"
+#include "esvr/metrics.h"
+#include "support/non_finite.h"
+
+namespace esvr {
+namespace {
+
+using test::InputGrid;
+using test::InputVoxel;
+using test::kInf;
+using test::kNan;
+using test::softBall;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+/// A ball with voxels that are not finite in it and beside it.
+InputGrid damagedBall(const std::string& name = "density") {
+  InputGrid grid{.name = name, .voxels = softBall({})};
+  for (InputVoxel& voxel : grid.voxels)
+    if ((voxel.at.x + 3 * voxel.at.y + 5 * voxel.at.z) % 11 == 0) voxel.value = kNan;
+  grid.voxels.push_back({{40, 0, 0}, kInf});
+  grid.voxels.push_back({{41, 0, 0}, -kInf});
+  return grid;
+}
+
+const ReadOptions kKeep{.nonFinite = NonFinite::kKeep};
+
+class NonFiniteFile : public test::Vdb2Esvr {
+ protected:
+  [[nodiscard]] std::string back() const { return folder_ / "back.vdb"; }
+
+  void convert(std::vector<std::string> options) const {
+    options.insert(options.begin(), {in(), out(), "--force", "--nonfinite", "keep"});
+    const auto run = test::vdb2esvr(options);
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+  void decode(const std::string& to) const {
+    const auto run = test::esvr2vdb({out(), to, "--force"});
+    ASSERT_EQ(run.exitCode, 0) << run.err;
+  }
+};
+
+/// Counts the voxels that are not finite in the first volume. The test fails if the second has others.
+std::uint64_t expectSame(const SparseVolume& a, const SparseVolume& b) {
+  const VolumeMetrics m = compareVolumes(a, b);
+  EXPECT_GT(m.nonFinite, 0u);
+  return m.nonFinite;
+}
+
+TEST_F(NonFiniteFile, isRefusedWithTheOptionThatKeepsIt) {
+  test::writeInput(in(), {damagedBall()});
+  const auto run = fitQuickly();
+  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(run.err, HasSubstr("--nonfinite keep stores where they are"));
+  EXPECT_FALSE(outIsThere());
+}
+
+TEST_F(NonFiniteFile, comesBackInEveryFormAndOutput) {
+  for (const bool isHalf : {false, true}) {
+    InputGrid grid = damagedBall();
+    grid.half = isHalf;
+    test::writeInput(in(), {grid});
+    const SparseVolume source = readGrid(in(), 0, kKeep).volume;
+    for (const std::vector<std::string>& goal :
+         {std::vector<std::string>{"--count", "30", "--iterations", "40"},
+          {"--psnr", "40", "--representation", "voxels"},
+          {"--max-error", "0.01"},
+          {"--max-relative-error", "1%"},
+          {"--lossless"},
+          {}}) {
+      convert(goal);
+      for (const char* name : {"back.vdb", "back.nvdb"}) {
+        decode(folder_ / name);
+        const VolumeGrid made = readGrid(folder_ / name, 0, kKeep);
+        EXPECT_EQ(expectSame(source, made.volume), expectSame(source, source));
+      }
+    }
+    EXPECT_EQ(inspectVdb(back()).grids.front().savedAsHalf, isHalf);
+  }
+}
+
+TEST_F(NonFiniteFile, isCountedByTheReportAndTheList) {
+  test::writeInput(in(), {damagedBall()});
+  const std::string report = folder_ / "report.json";
+  convert({"--max-error", "0.01", "--report", report});
+  std::ifstream stream(report);
+  const auto kept = nlohmann::json::parse(stream)["grids"][0]["source"]["nonfinite_kept"];
+  EXPECT_GT(kept["nan"], 20);
+  EXPECT_EQ(kept["plus_infinity"], 1);
+  EXPECT_EQ(kept["minus_infinity"], 1);
+  EXPECT_GT(kept["bytes"], 20);
+  const auto list = test::esvr2vdb({"--list", out(), "-v"});
+  EXPECT_THAT(list.out, AllOf(HasSubstr("not finite"), HasSubstr("non-finite voxels"),
+                              HasSubstr("NaN and 1 +infinity and 1 -infinity voxels")));
+}
+
+TEST_F(NonFiniteFile, isComparedWithoutThem) {
+  test::writeInput(in(), {damagedBall()});
+  convert({"--max-error", "0.01"});
+  const auto run = test::esvr2vdb({out(), back(), "--reference", in()});
+  EXPECT_EQ(run.exitCode, 0) << run.err;
+  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"check", in(), out(), "--max-error", "0.01"}).exitCode,
+            0);
+  InputGrid other = damagedBall();
+  other.voxels.back().value = 0.5f;
+  const std::string changed = folder_ / "changed.vdb";
+  test::writeInput(changed, {other});
+  const auto check = test::runProgram(ESVR_COMPARE, {"check", in(), changed});
+  EXPECT_NE(check.exitCode, 0);
+  EXPECT_THAT(check.out + check.err,
+              HasSubstr("(41, 0, 0) is not finite: it is minus infinity in the reference"));
+}
+
+TEST_F(NonFiniteFile, keepsComponentsOfVectors) {
+  // An infinity times the scales 1, -0.5 and 0 makes an infinity, a minus infinity and NaN.
+  test::InputVectors vectors{.voxels = softBall({})};
+  vectors.voxels[7].value = kInf;
+  test::writeVectorInput(in(), vectors);
+  for (const bool asDouble : {false, true}) {
+    vectors.asDouble = asDouble;
+    test::writeVectorInput(in(), vectors);
+    convert({"--max-error", "0.01", "--representation", "voxels"});
+    decode(back());
+    const VectorVolume a = readVector(in(), 0, kKeep).components,
+                       b = readVector(back(), 0, kKeep).components;
+    const Coord at = vectors.voxels[7].at;
+    for (const VectorVolume& made : {a, b}) {
+      EXPECT_EQ(valueAt(made[0], at), kInf);
+      EXPECT_EQ(valueAt(made[1], at), -kInf);
+      EXPECT_TRUE(std::isnan(valueAt(made[2], at)));
+    }
+    EXPECT_EQ(compareVectors(a, b).components[0].nonFinite, 1u);
+  }
+}
+
+TEST_F(NonFiniteFile, isSharedByTwins) {
+  test::writeInput(in(), {damagedBall(), damagedBall("copy")});
+  convert({"--max-error", "0.01"});
+  const EsvrFile file = readEsvr(out());
+  ASSERT_EQ(file.grids.size(), 2u);
+  EXPECT_EQ(file.grids[0].nonFiniteVoxels, file.grids[1].nonFiniteVoxels);
+  const auto summary = inspectEsvr(std::filesystem::path(out()));
+  int shared = 0;
+  for (const SectionSummary& section : summary.sections)
+    shared += section.kind == "non-finite voxels" && section.sharedWith.has_value();
+  EXPECT_EQ(shared, 1);
+}
+
+TEST_F(NonFiniteFile, ofALevelSetKeepsItsSides) {
+  InputGrid band{.background = 3.0f, .levelSet = true};
+  for (const InputVoxel& voxel : test::distances(11))
+    if (std::abs(voxel.value) < 3.0f) band.voxels.push_back(voxel);
+  test::writeInput(in(), {band});
+  const std::string filled =
+      folder_ / "filled.vdb";  // its inactive voxels have the signs of their sides
+  writeGrids(filled, {}, std::vector<VolumeGrid>{readGrid(in(), 0)});
+  const VolumeGrid clean = readGrid(filled, 0);
+  ASSERT_LT(valueAt(clean.volume, {}), 0.0f);
+  VolumeGrid source = clean;
+  for (float& value : source.volume.values)
+    if (value < -2.0f && value > -3.0f) value = kNan;  // the voxels next to the inside
+  std::filesystem::remove(in());
+  writeGrids(in(), {}, std::vector<VolumeGrid>{source});
+  for (const std::vector<std::string>& goal :
+       {std::vector<std::string>{"--lossless"},
+        {"--representation", "ellipsoids", "--psnr", "35"}}) {
+    convert(goal);
+    decode(back());
+    const SparseVolume made = readGrid(back(), 0, kKeep).volume;
+    // They have no sign. All others have that of the band without them.
+    EXPECT_EQ(compareSigns(clean.volume, made).voxels, expectSame(source.volume, made));
+  }
+}
+
+TEST_F(NonFiniteFile, ofASequenceComesBackInEachFrame) {
+  for (int frame = 1; frame <= 3; ++frame) {
+    InputGrid grid = damagedBall();
+    for (InputVoxel& voxel : grid.voxels) voxel.value *= 1.0f - 0.1f * float(frame);
+    test::writeInput(folder_ / ("in.000" + std::to_string(frame) + ".vdb"), {grid});
+  }
+  const auto run = test::vdb2esvr(
+      {folder_ / "in.####.vdb", out(), "--nonfinite", "keep", "--max-error", "0.01"});
+  ASSERT_EQ(run.exitCode, 0) << run.err;
+  ASSERT_EQ(test::esvr2vdb({out(), folder_ / "back.####.vdb"}).exitCode, 0);
+  for (const char* frame : {".0001.vdb", ".0002.vdb", ".0003.vdb"}) {
+    const VolumeMetrics m =
+        compareVolumes(readGrid(folder_ / ("in" + std::string(frame)), 0, kKeep).volume,
+                       readGrid(folder_ / ("back" + std::string(frame)), 0, kKeep).volume);
+    EXPECT_GT(m.nonFinite, 20u);
+    EXPECT_LE(m.maxError, 0.01);
+  }
+}
+
+TEST_F(NonFiniteFile, isDrawnAsIfTheyWereEmpty) {
+  InputGrid empty = damagedBall();
+  std::erase_if(empty.voxels, [](const InputVoxel& voxel) { return !std::isfinite(voxel.value); });
+  const auto picture = [&](const std::string& from, const std::string& name) {
+    const std::string to = folder_ / name;
+    const auto run =
+        test::runProgram(ESVR_RENDER, {from, to, "--resolution", "32x32", "--device", "cpu",
+                                       "--eye", "40,30,20", "--center", "0,0,0", "--range", "0,1"});
+    EXPECT_EQ(run.exitCode, 0) << run.err;
+    std::ifstream stream(to, std::ios::binary);
+    const std::string bytes(std::istreambuf_iterator<char>(stream), {});
+    return bytes.substr(bytes.find("IDAT"));  // the text before it has the command line
+  };
+  test::writeInput(in(), {damagedBall()});
+  convert({"--lossless"});
+  const std::string ofEsvr = picture(out(), "esvr.png"), ofVdb = picture(in(), "vdb.png");
+  test::writeInput(in(), {empty});
+  const std::string ofEmpty = picture(in(), "empty.png");
+  EXPECT_TRUE(ofVdb == ofEmpty);
+  EXPECT_TRUE(ofEsvr == ofEmpty);
+}
+
+}  // namespace
+}  // namespace esvr
