@@ -45,7 +45,7 @@ bool all_of(Range&& range, Test test) {
 }
 template <class Range, class Test>
 bool any_of(Range&& range, Test test) {
-  return std::any_of(range.begin(), range.end(), test);
+  return std::any_of(std::begin(range), std::end(range), test);
 }
 template <class Range, class Value, class Projection = same>
 auto find(Range&& range, const Value& value, Projection projection = {}) {
@@ -74,6 +74,14 @@ template <class Range, class Value>
 auto upper_bound(Range&& range, const Value& value) {
   return std::upper_bound(range.begin(), range.end(), value);
 }
+template <class Range, class Value>
+bool binary_search(Range&& range, const Value& value) {
+  return std::binary_search(range.begin(), range.end(), value);
+}
+template <class Range, class Test>
+auto adjacent_find(Range&& range, Test test) {
+  return std::adjacent_find(range.begin(), range.end(), test);
+}
 template <class Range>
 void sort(Range&& range) {
   std::sort(range.begin(), range.end());
@@ -89,6 +97,10 @@ struct copied {
 template <class Range, class Output>
 copied<Output> copy(Range&& range, Output out) {
   return {std::copy(range.begin(), range.end(), out)};
+}
+template <class Range, class Output, class Function>
+void transform(Range&& range, Output out, Function function) {
+  std::transform(range.begin(), range.end(), out, function);
 }
 template <class Range, class Other, class Output>
 void set_union(Range&& range, Other&& other, Output out) {
