@@ -21,7 +21,7 @@ KINDS = {1: "file metadata", 2: "grid", 3: "chunks", 4: "bricks", 6: "layer erro
          12: "packed sections", 16: "centers", 17: "scales", 18: "rotations", 19: "intensities",
          20: "kappas", 32: "ellipsoids", 34: "layered ellipsoids", 35: "mask", 36: "voxels",
          37: "residual", 38: "carried bytes", 41: "related voxels",
-         64: "sequence index"}
+         42: "non-finite voxels", 64: "sequence index"}
 PLANES = {"centers": 3, "scales": 3, "rotations": 4, "intensities": 1, "kappas": 1}
 
 
@@ -116,7 +116,11 @@ def grid(data):
     if g["topology"] & 16:
         g["tone"] = r.get("f")
         assert 0 < g["tone"] < math.inf and g["within range"] == 1
-    for key, form in (("active voxels", "Q"), ("range", "2f"), ("field background", "f"),
+    g["active voxels"] = r.get("Q")
+    if g["topology"] & 32:
+        g["not finite"] = [r.varint() for _ in range(3)]
+        assert 1 <= sum(g["not finite"]) <= g["active voxels"]
+    for key, form in (("range", "2f"), ("field background", "f"),
                       ("kernel", "B"), ("kappa", "f"), ("epsilon", "f"), ("chunk count", "I")):
         g[key] = r.get(form)
     g["chunks"] = [r.chunk()] if g["chunk count"] == 1 else []
@@ -791,7 +795,7 @@ def content(name, data):
         values = struct.unpack(f"<{n * PLANES[name]}f", data)
         return [values[i * n:(i + 1) * n] for i in range(PLANES[name])]
     readers = {"grid": grid, "chunks": chunks, "bricks": bricks, "ellipsoids": ellipsoids,
-               "voxels": voxels, "mask": voxels, "residual": voxels,
+               "voxels": voxels, "mask": voxels, "residual": voxels, "non-finite voxels": voxels,
                "layered ellipsoids": layered, "layer errors": layer_errors, "curve": curve,
                "carried grid": carried, "vector grid": vectors, "grid records": grid_records,
                "related voxels": related, "packed sections": packed, "sequence index": sequence_index}
@@ -832,11 +836,11 @@ def add(sections, minor, row):
     """Adds a section and returns the name of its kind; None if it is unknown."""
     kind, g, c, flags, codec, stored, raw, part = row
     name = KINDS.get(kind)
-    assert kind not in (39, 42), "a kind of frames in the short form, which this reader refuses"
+    assert kind != 39, "a kind of frames in the short form, which this reader refuses"
     if name is None:
         assert flags == 0, "an unknown kind is optional here"
         return None
-    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4}.get(kind, 0)
+    since = {8: 1, 38: 1, 9: 2, 64: 3, 11: 4, 12: 4, 41: 4, 42: 6}.get(kind, 0)
     assert minor >= since, f"a kind of version 1.{since}"
     optional = name in ("curve", "layer errors", "carried grid", "carried bytes", "vector grid")
     assert flags == (0 if optional else 1), "flags"
@@ -854,7 +858,7 @@ def read(data):
     magic, major, minor, count, size, table, table_sum, header_sum = struct.unpack_from(
         "<8sHHIQQQQ", data)
     assert magic == bytes.fromhex("89 45 53 56 52 0D 0A 0A"), "magic"
-    assert major == 1 and minor in (0, 1, 2, 3, 4, 5) and size == len(data), "version or size"
+    assert major == 1 and minor in range(7) and size == len(data), "version or size"
     assert table % 8 == 0 and header_sum == xxh64(data[:40]), "header checksum"
     assert table_sum == xxh64(data[table:table + 56 * count]), "table checksum"
 
@@ -1058,6 +1062,18 @@ def check_voxels(sections):
     assert values == len(held) > 800
 
 
+def check_non_finite(sections):
+    """Expects the few values, whose record counts the voxels of the section."""
+    check_voxels(sections)
+    record = sections["grid", 0, NONE]
+    assert (record["topology"], record["not finite"]) == (32, [4, 0, 1])
+    head, held = sections["non-finite voxels", 0, NONE]
+    assert (head["form"], head["background"], head["palette"]) == (3, 0.0, [0.0, 1.0, 3.0])
+    kinds = {p: head["palette"][code] for p, (code, active) in held.items() if active}
+    assert kinds == {**{(-6, 19, z): 1.0 for z in range(4, 8)}, (-1, 23, 15): 3.0}
+    assert kinds.keys() == held.keys(), "all others are vacant"
+
+
 def check_two_grids(sections):
     assert sections["curve", 0, NONE] == [(100, 31.25, 20.5, 0.25, 10), (200, 41.25, 30.5, 0.125, 30)]
 
@@ -1126,7 +1142,7 @@ def check_sequence(sections):
 CHECKS = {"one_ellipsoid": check_one_ellipsoid, "unknown_section": check_one_ellipsoid,
           "level_set": check_level_set, "quantised": check_quantised, "layered": check_layered,
           "voxels": check_voxels, "mask": check_mask, "box_voxels": check_box_voxels, "tone": check_tone,
-          "residual": check_residual,
+          "residual": check_residual, "non_finite": check_non_finite,
           "mirrored_voxels": check_mirrored, "copied_voxels": check_copied,
           "two_grids": check_two_grids, "twins": check_twins, "carried": check_carried,
           "vector_grid": check_vector_grid, "related_voxels": check_related_voxels,

@@ -14,7 +14,9 @@
 #include "format/bytes.h"
 #include "format/crafted_file.h"
 #include "format/encode.h"
+#include "format/non_finite_section.h"
 #include "format/sequence_index.h"
+#include "support/non_finite.h"
 
 namespace esvr::test {
 
@@ -95,6 +97,8 @@ std::string difference(const StoredGrid& a, const StoredGrid& b) {
   if (a.curve != b.curve) return "curve";
   if (a.voxels != b.voxels) return "voxels";
   if (a.residual != b.residual) return "residual";
+  if (a.nonFiniteVoxels != b.nonFiniteVoxels || !(a.nonFinite == b.nonFinite))
+    return "voxels that are not finite";
   if (a.quantised != b.quantised) return "quantised";
   if (a.layerErrors != b.layerErrors) return "errors of layers";
   return difference(a.field, b.field);
@@ -295,6 +299,18 @@ StoredGrid fewValues() {
   return makeStoredVoxels({}, volume, exactLayer(volume));
 }
 
+/// The few values, of which four in a row are NaN and the last one is minus infinity.
+StoredGrid notAllFinite() {
+  StoredGrid grid = fewValues();
+  SparseVolume volume = volumeOf(*grid.voxels);
+  const auto first = volume.brickValues(0), last = volume.brickValues(1);
+  std::fill_n(first.begin() + voxelOffset({2, 3, 4}), 4, kNan);
+  last.back() = -kInf;
+  grid.nonFiniteVoxels = format::nonFiniteLayer(volume);
+  grid.nonFinite = format::countsOf(*grid.nonFiniteVoxels);
+  return grid;
+}
+
 /// A palette of positive values as floats, whose order is that of their bits.
 VoxelLayer asFloats(VoxelLayer layer) {
   layer.form = VoxelForm::kFloat;
@@ -449,6 +465,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"voxels", fileOf(fewValues())},
       {"mirrored_voxels", fileOf(mirroredValues())},
       {"copied_voxels", fileOf(copiedValues())},
+      {"non_finite", fileOf(notAllFinite())},
       {"mask", fileOf(masked())},
       {"box_voxels", fileOf(withBoxVoxels())},
       {"tone", fileOf(withTone())},
