@@ -20,6 +20,9 @@ std::string byteText(double bytes) {
 }
 
 std::uint64_t usualMemoryLimit() {
+#ifdef __EMSCRIPTEN__
+  return kNoMemoryLimit;  // the pages below would be those that the module has now, and it gets more
+#endif
   const long pages = ::sysconf(_SC_PHYS_PAGES), pageBytes = ::sysconf(_SC_PAGESIZE);
   if (pages <= 0 || pageBytes <= 0) return kNoMemoryLimit;  // the system does not tell
   return std::uint64_t(pages) * std::uint64_t(pageBytes) / 2;

@@ -57,7 +57,7 @@ void startDevice(const Device& device) noexcept;
 inline constexpr std::uint64_t kNoMemoryLimit = std::numeric_limits<std::uint64_t>::max();
 
 /// The limit of interfaces whose callers name none: half of the memory of the machine, so that a small
-/// file that asks for more is refused before the machine swaps.
+/// file that asks for more is refused before the machine swaps; no limit where the system does not tell.
 [[nodiscard]] std::uint64_t usualMemoryLimit();
 
 /// Checks an amount of memory against a limit.
