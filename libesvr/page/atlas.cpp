@@ -204,12 +204,8 @@ using namespace esvr;
 page_atlas* page_make_atlas(const esvr_volume* volume, int level, int most_side,
                             double most_bytes) {
   std::unique_ptr<page::Atlas> atlas;
-  (void)capi::guarded([&] {
-    const bool areFinite = !hasNonFinite(volume->voxels);
-    SparseVolume finite;  // without the voxels that are NaN or infinite, which are empty
-    if (!areFinite) finite = volume->voxels, dropNonFinite(finite);
-    atlas = page::makeAtlas(areFinite ? volume->voxels : finite, level, most_side, most_bytes);
-  });
+  (void)capi::guarded(
+      [&] { atlas = page::makeAtlas(volume->voxels, level, most_side, most_bytes); });
   return atlas.release();
 }
 

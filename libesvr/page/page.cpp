@@ -10,6 +10,7 @@
 
 #include "capi/objects.h"
 #include "esvr/camera.h"
+#include "esvr/grid_coding.h"
 #include "esvr/transfer_function.h"
 #include "render/sample_rule.h"
 #include "render/transfer_table.h"
@@ -85,10 +86,11 @@ void putPoints(Json& json, const OpacityCurve& curve) {
   json.raw("]");
 }
 
+/// The memory that decoding may take: that of the module (CMakeLists.txt), whose sizes have 32 bits.
+constexpr std::uint64_t kMostMemory = std::uint64_t{1} << 31;
+
 /// The look that esvr-render gives a grid without options.
-TransferFunction lookOf(const StoredGrid& grid) {
-  return usualLook(lookBasis(grid, kNoMemoryLimit));
-}
+TransferFunction lookOf(const StoredGrid& grid) { return usualLook(lookBasis(grid, kMostMemory)); }
 
 void putLook(Json& json, const TransferFunction& f) {
   json.raw("{").name("space").string(kSpaces[int(f.colors.space)]);
@@ -245,15 +247,22 @@ char* page_looks() {
   return text;
 }
 
+esvr_status page_decode(const esvr_file* file, int grid, esvr_volume** volume) {
+  return capi::guarded([&] {
+    const StoredGrid& stored = file->content.grids.at(std::size_t(grid));
+    const DecodeOptions options{.maxBytes = page::kMostMemory, .keepsNonFinite = false};
+    *volume = new esvr_volume(decodeGrid(stored, options));
+  });
+}
+
 void page_histogram(const esvr_volume* volume, double low, double high, int count, double* counts) {
   std::fill_n(counts, count, 0.0);
   const double perUnit = high > low ? count / (high - low) : 0.0;
   const SparseVolume& voxels = volume->voxels;
   for (std::size_t b = 0; b < voxels.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v) {
-      const float value = voxels.brickValues(b)[std::size_t(v)];
-      if (!voxels.active[b].test(v) || !std::isfinite(value)) continue;
-      const double place = (double(value) - low) * perUnit;
+      if (!voxels.active[b].test(v)) continue;
+      const double place = (double(voxels.brickValues(b)[std::size_t(v)]) - low) * perUnit;
       ++counts[int(std::clamp(place, 0.0, double(count - 1)))];
     }
 }

@@ -18,6 +18,11 @@ char* page_grids(const esvr_file* file);
 /// \return null on failure
 char* page_looks();
 
+/// Decodes a grid as drawing takes it: voxels that are NaN or infinite are empty. Everything below that takes a volume
+/// takes one of these, whose values are all finite.
+/// \param volume  output; freed by esvr_free_volume
+esvr_status page_decode(const esvr_file* file, int grid, esvr_volume** volume);
+
 /// Counts the active voxels of a volume in `count` intervals from `low` to `high`. Values outside
 /// count in the first or the last one.
 void page_histogram(const esvr_volume* volume, double low, double high, int count, double* counts);

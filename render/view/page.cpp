@@ -4,11 +4,8 @@
 #include <iterator>
 #include <span>
 #include <stdexcept>
-#include <vector>
 
-#include "esvr/container.h"
 #include "esvr/error.h"
-#include "esvr/grid.h"
 #include "programs/files.h"
 #include "programs/page.h"
 #include "programs/sequence.h"
@@ -38,13 +35,6 @@ void checkInput(const Export& what) {
   if (cli::framesInFile(what.input))
     throw UsageError(name + " holds a sequence, and a page shows one frame");
   (void)showFile(what.input, what.memory);
-  const ReadPart records{.grids = std::vector<std::size_t>{},
-                         .limits = {what.memory.maxBytes, what.memory.voxels}};
-  for (const StoredGrid& grid : readEsvrPart(what.input, records).file.grids)
-    if (grid.nonFinite.total() > 0)
-      throw UsageError(name + ": grid \"" + shownName(grid.descriptor.name) +
-                       "\" has NaN or infinite voxels, which the decoder in a page does not read; "
-                       "without --export, they are shown as empty");
   if (fs::file_size(what.input) > kMostExportedBytes)
     throw UsageError(name + " has more than " + std::to_string(kMostExportedBytes >> 20) +
                      " MiB, which is too large for a page");

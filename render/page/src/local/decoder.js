@@ -74,11 +74,11 @@ export class Decoder {
     return Array.from({ length: count }, (_, i) => this.#text(this.#exports.esvr_carried_name(file, i)));
   }
 
-  /** Decodes a grid. @param {number} file @param {number} grid @returns {number} the volume */
+  /** Decodes a grid, without voxels that are NaN or infinite. @param {number} file @param {number} grid @returns {number} the volume */
   decode(file, grid) {
     return this.#scoped((take) => {
       const out = take(kWordBytes);
-      this.#check(this.#exports.esvr_decode(file, grid, 0, 0n, out));
+      this.#check(this.#exports.page_decode(file, grid, out));
       return this.#words(out, 1)[0];
     });
   }
