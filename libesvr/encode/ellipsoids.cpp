@@ -211,8 +211,9 @@ constexpr double kGrownFrom = 0.9;
 /// one is that near.
 constexpr double kNear = 1.3;
 constexpr int kMostDrafts = 3;
-/// Largest number of ellipsoids of the first of them, and the largest growth from one to the next.
-constexpr double kMostOfFirstDraft = 2000.0, kMostGrowthOfDraft = 4.0;
+/// Largest number of ellipsoids of the first of them, and of one that scouts before them. Where the first one is farther
+/// from the PSNR than kFar times its number of ellipsoids, one with as many times fewer shows the slope.
+constexpr double kMostOfFirstDraft = 6000.0, kMostOfScout = 2000.0, kFar = 4.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
 constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
@@ -305,7 +306,7 @@ double firstCount(const Job& job) {
 }  // namespace
 
 Attempt scoutingFit(const Job& job) {
-  const double count = std::min(firstCount(job), kMostOfFirstDraft);
+  const double count = std::min(firstCount(job), kMostOfScout);
   return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
 }
 
@@ -436,6 +437,15 @@ double EllipsoidSearch::forecastCount(double psnr) const {
   return std::clamp(count, countOf(*draft_) / kMaxGrowth, countOf(*draft_) * kMaxGrowth);
 }
 
+/// Takes the growth of the PSNR from the last short fit to another one.
+void EllipsoidSearch::learnSlope(const Attempt& other) {
+  const double doublings = std::log2(countOf(other) / countOf(*draft_));
+  if (std::abs(doublings) < std::log2(kMinSlopeRatio)) return;
+  slopeIsKnown_ = true;
+  slope_ = std::clamp((other.psnr - draft_->psnr) / doublings, kMinSlope,
+                      2.0 * kTuning.steepestDbPerDoubling);
+}
+
 /// A short fit whose number of ellipsoids is near the one that the PSNR needs. The first guess can be
 /// far from it, where signs and prices differ.
 void EllipsoidSearch::draftNearPsnr() {
@@ -443,24 +453,27 @@ void EllipsoidSearch::draftNearPsnr() {
   // Where ellipsoids win, they usually take about half of the bytes.
   if (goal_.below) guess = std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach);
   draft_ = job_.scout ? *job_.scout : shortFit(capped(guess));
+  const auto next = [&] { return capped(kGrownFrom * forecastCount(aim())); };
+  const auto another = [&](double count) {
+    auto made = unlessCancelled([&]() -> std::optional<Attempt> { return shortFit(count); });
+    if (!made) draft_->fit.end = FitEnd::kCancelled;
+    return made;
+  };
   for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
     isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
     if (draft_->cancelled() || isTooLarge_) return;
-    const double count =
-        capped(std::min(kGrownFrom * forecastCount(aim()), kMostGrowthOfDraft * countOf(*draft_)));
-    const double ratio = count / countOf(*draft_);
+    if (!slopeIsKnown_ && next() > kFar * countOf(*draft_)) {
+      const auto fewer = another(countOf(*draft_) / kFar);
+      if (!fewer) return;
+      learnSlope(*fewer);
+      isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
+      if (isTooLarge_) return;
+    }
+    const double count = next(), ratio = count / countOf(*draft_);
     if (std::max(ratio, 1.0 / ratio) <= kNear) return;
-    auto nearer = unlessCancelled([&]() -> std::optional<Attempt> { return shortFit(count); });
-    if (!nearer) {
-      draft_->fit.end = FitEnd::kCancelled;
-      return;
-    }
-    const double doublings = std::log2(countOf(*nearer) / countOf(*draft_));
-    if (std::abs(doublings) >= std::log2(kMinSlopeRatio)) {
-      slopeIsKnown_ = true;
-      slope_ = std::clamp((nearer->psnr - draft_->psnr) / doublings, kMinSlope,
-                          2.0 * kTuning.steepestDbPerDoubling);
-    }
+    auto nearer = another(count);
+    if (!nearer) return;
+    learnSlope(*nearer);
     draft_ = std::move(nearer);
   }
 }

@@ -104,6 +104,7 @@ class EllipsoidSearch {
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
   [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
+  void learnSlope(const Attempt& other);
   void draftNearPsnr();
   void decideSigns();
   void forecast();

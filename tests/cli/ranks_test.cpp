@@ -117,8 +117,10 @@ TEST_F(RanksTest, SayOnceWhatIsWrongForAll) {
 
 TEST_F(RanksTest, WarnsWhereARankUsesFewOfItsCores) {
   if (std::thread::hardware_concurrency() < 2) GTEST_SKIP() << "one core is all that there is";
-  const auto bound = onRanks("1", conversion("out.esvr", {}));
-  EXPECT_EQ(countOf("--bind-to none", bound.err), 1u) << bound.err;
+  auto bound = conversion("out.esvr", {});
+  bound.insert(bound.begin(), {"--bind-to", "hwthread"});
+  const auto onOne = onRanks("1", bound);
+  EXPECT_EQ(countOf("--bind-to none", onOne.err), 1u) << onOne.err;
   auto command = conversion("out.esvr", {"--force"});
   command.insert(command.begin(), {"--bind-to", "none"});
   const auto free = onRanks("1", command);

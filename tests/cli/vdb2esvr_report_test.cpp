@@ -470,7 +470,8 @@ TEST_F(LeftOut, saysWhetherTheLatticeContainsThePlateau) {
   const Json plateau = entryOf(grid, "plateau");
   EXPECT_TRUE(plateau["used"]);
   EXPECT_EQ(plateau["bytes_with"], grid["representation"]["voxels"]["bytes"]);
-  EXPECT_LT(plateau["bytes_with"].get<int>(), plateau["bytes_without"].get<int>());
+  EXPECT_FALSE(plateau.contains("bytes_without"))
+      << "the lattice is fine, so that no other one was tried";
   EXPECT_GT(plateau["seconds"].get<double>(), 0.0);
 }
 
