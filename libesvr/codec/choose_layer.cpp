@@ -1,10 +1,10 @@
 // Voxel layers for an encoder: exact ones, ones within a bound, and ones whose codes take fewer bits.
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <functional>
-#include <iterator>
 #include <optional>
 #include <string>
 #include <unordered_set>
@@ -64,46 +64,41 @@ double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
 namespace {
 
 constexpr std::size_t kLargestPalette = 4096;
+/// Bricks whose values one thread collects.
+constexpr std::size_t kBricksOfPart = 256;
 
 bool sameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
-/// The numbers of the distinct values of bricks in increasing order; one more than kLargestPalette if there are more.
-std::vector<std::int32_t> ordersOf(const SparseVolume& volume,
-                                   const tbb::blocked_range<std::size_t>& bricks) {
-  std::unordered_set<std::int32_t> orders;
-  std::optional<std::int32_t> last;
-  for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
-    for (const float v : volume.brickValues(b)) {
-      const std::int32_t order = codec::orderOfFloat(v);
-      if (last == order) continue;
-      orders.insert(*(last = order));
-      if (orders.size() > kLargestPalette) break;
-    }
-  std::vector<std::int32_t> sorted(orders.begin(), orders.end());
-  std::sort(sorted.begin(), sorted.end());
-  return sorted;
-}
-
 /// The distinct values of a volume in increasing order; empty if there are too many for a palette.
 std::vector<float> paletteOf(const SparseVolume& volume) {
-  using Orders = std::vector<std::int32_t>;
   using Range = tbb::blocked_range<std::size_t>;
-  const auto joined = [](const Orders& a, const Orders& b) {
-    Orders both;
-    std::ranges::set_union(a, b, std::back_inserter(both));
-    return both;
+  using Orders = std::unordered_set<std::int32_t>;  // numbers of floats in increasing order
+  std::atomic<bool> areTooMany{false};
+  const auto joined = [&](Orders a, const Orders& b) {
+    if (!areTooMany) a.insert(b.begin(), b.end());
+    if (a.size() > kLargestPalette) areTooMany = true;
+    return a;
   };
   const Orders orders = parallelReduce(
-      Range(0, volume.brickCount()), Orders{},
-      [&](const Range& bricks, const Orders& before) {
-        return before.size() > kLargestPalette ? before : joined(before, ordersOf(volume, bricks));
+      Range(0, volume.brickCount(), kBricksOfPart), Orders{},
+      [&](const Range& bricks, Orders found) {
+        std::optional<std::int32_t> last;
+        for (std::size_t b = bricks.begin(); b != bricks.end() && !areTooMany; ++b) {
+          for (const float v : volume.brickValues(b)) {
+            const std::int32_t order = codec::orderOfFloat(v);
+            if (last != order) found.insert(*(last = order));
+          }
+          if (found.size() > kLargestPalette) areTooMany = true;
+        }
+        return found;
       },
       joined);
-  if (orders.size() > kLargestPalette) return {};
+  if (areTooMany) return {};
   std::vector<float> values;
   for (const std::int32_t order : orders) values.push_back(codec::floatAt(order));
+  std::sort(values.begin(), values.end(), codec::inOrder);
   return values;
 }
 

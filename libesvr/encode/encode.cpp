@@ -75,7 +75,7 @@ class Choice {
     const auto below = std::uint64_t(margin * share * double(expected->bytes));
     figures_ = Candidate{ellipsoids_->expectedBytes(), *goal_.psnr, true, seconds_};
     if (!ellipsoids_->mayStayBelow(below) ||
-        expected->bytes < figures_->bytes + leastSaving(plan_.wholeIterations))
+        expected->bytes < figures_->bytes + leastSaving(wholeIterations(figures_->bytes)))
       return completeVoxels();
     completeEllipsoids();
     const bool reached = conversion_ && *figures_->psnr >= *goal_.psnr;
@@ -134,6 +134,11 @@ class Choice {
     return std::uint64_t(kTuning.bytesPerWork * work / effortFactor(job_.options.effort));
   }
 
+  /// Iterations of a whole fit of so many bytes.
+  double wholeIterations(std::uint64_t bytes) const {
+    return plan_.wholeIterations * std::min(1.0, double(bytes) / kTuning.bytesOfWholeFit);
+  }
+
   bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
 
   UsageError tooSmall(std::uint64_t needed) const {
@@ -174,8 +179,7 @@ class Choice {
     const auto estimate = [&] { return unlessCancelled([&] { return voxels_->estimate(); }); };
     if (!onGpu) {
       expected = estimate();
-      const auto least = leastSaving(plan_.wholeIterations + 2.0 * plan_.shortIterations);
-      if (!expected || expected->bytes < std::max(smallEnough, least)) return expected;
+      if (!expected || expected->bytes < smallEnough) return expected;
       ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
       draft(nullptr);
       return expected;
