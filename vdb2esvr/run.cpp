@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <future>
 #include <iostream>
@@ -490,13 +491,13 @@ int coresOf(pid_t process) {
 }
 
 /// Open MPI binds each of one or two ranks to a core, on which all work of the host then runs. Its own
-/// process may use what the ranks of this host have together.
-void warnOfFewCores(const Ranks& ranks, const cli::Log& log) {
+/// process may use what the ranks of this host have together. A single rank runs without messages, and is bound, too.
+void warnOfFewCores(const cli::Log& log) {
+  const char* const ranks = std::getenv("OMPI_COMM_WORLD_LOCAL_SIZE");
   const int own = coresOf(0), all = coresOf(::getppid());
-  if (own == 0 || 2 * own * ranks.ranksOnHost() > all) return;
-  log.warning("each of the " + std::to_string(ranks.ranksOnHost()) + " ranks of this host uses " +
-              std::to_string(own) + " of its " + std::to_string(all) +
-              " cores; mpirun --bind-to none gives them all cores");
+  if (ranks == nullptr || own == 0 || 2 * own * std::max(std::atoi(ranks), 1) > all) return;
+  log.warning("each rank of this host uses " + std::to_string(own) + " of its " +
+              std::to_string(all) + " cores; mpirun --bind-to none gives them all cores");
 }
 
 int runAs(const Options& options, Ranks* ranks) {
@@ -506,10 +507,8 @@ int runAs(const Options& options, Ranks* ranks) {
                                    : cli::FurtherSignals::kEndAtOnce);
   if (!options.keepsBest()) interrupts.discardResults();
   checkFiles(options);
-  if (ranks) {
-    tellWhatSurvives(options, log);
-    warnOfFewCores(*ranks, log);
-  }
+  if (ranks) tellWhatSurvives(options, log);
+  if (!ranks || ranks->rank() == 0) warnOfFewCores(log);
   const RunRecord record = convertOrReport(options, ranks, interrupts, log);
   if (options.onlyFits) {
     if (record.interrupted) throw RuntimeFailure("interrupted");  // as rank 0 does

@@ -73,7 +73,6 @@ class MpiRanks : public Ranks {
     MPI_Comm host;
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, rank_, MPI_INFO_NULL, &host);
     MPI_Comm_rank(host, &rankOnHost_);
-    MPI_Comm_size(host, &ranksOnHost_);
     MPI_Comm_free(&host);
   }
   ~MpiRanks() override {
@@ -86,7 +85,6 @@ class MpiRanks : public Ranks {
   [[nodiscard]] int rank() const override { return rank_; }
   [[nodiscard]] int count() const override { return count_; }
   [[nodiscard]] int rankOnHost() const override { return rankOnHost_; }
-  [[nodiscard]] int ranksOnHost() const override { return ranksOnHost_; }
 
   bool agree(std::uint64_t number) override {
     waitForAll();
@@ -179,7 +177,7 @@ class MpiRanks : public Ranks {
                 MPI_COMM_WORLD);
   }
 
-  int rank_ = 0, count_ = 1, rankOnHost_ = 0, ranksOnHost_ = 1;
+  int rank_ = 0, count_ = 1, rankOnHost_ = 0;
   std::mutex mutex_;
   bool isNoneLeft_ = true, haveAllEnded_ = false;
   std::unique_ptr<Dispatcher> dispatcher_;  ///< on rank 0, while numbers are handed out

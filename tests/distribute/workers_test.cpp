@@ -133,7 +133,6 @@ class TwoRanks : public Ranks {
   [[nodiscard]] int rank() const override { return 0; }
   [[nodiscard]] int count() const override { return 2; }
   [[nodiscard]] int rankOnHost() const override { return 0; }
-  [[nodiscard]] int ranksOnHost() const override { return 1; }
   bool agree(std::uint64_t) override { return agree_; }
   void handOut(std::size_t count) override { count_ = count, next_ = 0; }
   std::optional<std::size_t> next() override {

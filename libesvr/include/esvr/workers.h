@@ -108,7 +108,6 @@ class Ranks {
   [[nodiscard]] virtual int count() const = 0;  ///< number of ranks
   [[nodiscard]] virtual int rankOnHost()
       const = 0;  ///< number among the ranks of this host, from 0
-  [[nodiscard]] virtual int ranksOnHost() const = 0;  ///< number of ranks of this host
 
   /// \return whether a number is the same on all ranks
   [[nodiscard]] virtual bool agree(std::uint64_t number) = 0;
