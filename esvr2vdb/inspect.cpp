@@ -99,7 +99,7 @@ std::vector<std::string> rowOf(const SequenceFrame& frame) {
 /// What the file of a frame says of itself.
 struct FrameFile {
   std::string grids;  ///< their names; "-" if there are none
-  std::string notes;  ///< of the file's metadata
+  std::string notes;  ///< what the file's metadata say
 };
 
 FrameFile inspectFrame(const fs::path& path, const Options& options) {
@@ -129,7 +129,7 @@ void listFrames(const Options& options, const cli::FramePattern& pattern) {
   cli::Table table({"frame", "bytes", "grids"});
   std::vector<cli::FrameNumber> failed;
   std::optional<Error> first;
-  std::string notes;  // of the first frame that has any
+  std::string notes;  // those of the first frame that has any
   for (const cli::FrameNumber frame : listing.frames) {
     const fs::path path = pattern.toRead(frame);
     try {

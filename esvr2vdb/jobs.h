@@ -32,7 +32,7 @@ struct SplatWish {
 
 /// The size of the voxels that are written.
 struct Resolution {
-  double factor = 1.0;  ///< of the edges of the source's voxels
+  double factor = 1.0;  ///< edge of a voxel relative to that of the source's
   std::optional<double>
       voxelSize{};      ///< their shortest edge in units of the world, instead of `factor`
   bool isAuto = false;  ///< the grids fit into the memory

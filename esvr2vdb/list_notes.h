@@ -23,7 +23,7 @@ class GridNotes {
   void print(std::ostream& out) const;
 
  private:
-  std::vector<std::string> texts_;            ///< in the order in which they were added
+  std::vector<std::string> texts_;            ///< the notes in the order in which they were added
   std::map<std::string, std::string> grids_;  ///< names by text
 };
 

@@ -51,7 +51,7 @@ struct Margin {
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
 /// Plan::wholeFits whole fits are made (for a size up to five, if the ellipsoids of none before keep to
-/// it), and at most four short ones: three to find the number of ellipsoids, and one to decide about their
+/// it), and at most five short ones: four to find the number of ellipsoids, and one to decide about their
 /// signs.
 class EllipsoidSearch {
  public:
@@ -135,7 +135,8 @@ class EllipsoidSearch {
   std::uint64_t besides_ = 0;              ///< bytes of the grid's other sections
   std::uint64_t expectedBytes_ = 0, needed_ = 0;
   std::vector<Attempt> attempts_;
-  std::optional<double> reached_;  ///< as reached(), of the conversion that was made last or kept
+  std::optional<double>
+      reached_;  ///< the judged quality, dB, of the conversion that was made last or kept
 };
 
 /// True if many active voxels have an extreme value of the volume, so that both signs of intensities

@@ -154,7 +154,7 @@ struct Parts {
 
 /// What the voxels of a coarse brick have been given.
 struct Sums {
-  std::array<double, kBrickVoxels> difference{};  ///< of the values from the background, by volume
+  std::array<double, kBrickVoxels> difference{};  ///< values less the background, by volume
   std::array<double, kBrickVoxels> active{};      ///< volume of active voxels that are finite
   std::array<double, kBrickVoxels> missing{};     ///< volume of voxels that are not finite
 };

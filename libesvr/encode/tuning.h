@@ -56,7 +56,7 @@ struct Tuning {
   double bytesOfWholeFit = 4096.0;
 
   /// Bytes that a fit on the CPU must be expected to save, compared with voxels, for each brick and iteration. These take 5 to
-  /// 15 us, so that a fit saves at least some 200 bytes in each second. It saves 0.082 in smoke1, 0.009 in hydrogen_atom, 0.013
+  /// 15 us, so that a fit saves at least some 200 bytes in each second. A fit saves 0.082 in smoke1, 0.009 in hydrogen_atom, 0.013
   /// in dragon, and 0.0008 in the shadow of gas_0006, where the fits took 30 s for 1.5 KB.
   double bytesPerWork = 0.002;
 
