@@ -18,10 +18,20 @@ if(ESVR_WERROR)
                       "$<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings;-Xcompiler=-Werror>")
 endif()
 
+# The optimisation of programs, which spend their time in libesvr: they compile in two thirds of the time
+# (esvr_viewer: 42 instead of 57 s).
+set(ESVR_PROGRAM_OPTIMISATION "$<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CONFIG:Release>>:-O1>")
+
 if(ESVR_SANITIZE)
+  set(ESVR_PROGRAM_OPTIMISATION -O0)
   set(sanitize -fsanitize=${ESVR_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   if(CMAKE_CXX_COMPILER_ID MATCHES Clang)
     list(APPEND sanitize -fsanitize-ignorelist=${CMAKE_CURRENT_LIST_DIR}/sanitizer_ignorelist.txt)
+  endif()
+  if(ESVR_SANITIZE MATCHES address)
+    # Checks of every pointer, which take a quarter of the time of a unit. The address sanitizer sees an access
+    # through a wrong one.
+    list(APPEND sanitize -fno-sanitize=null,object-size,pointer-overflow)
   endif()
   add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:${sanitize}>")
   add_link_options(-fsanitize=${ESVR_SANITIZE})

@@ -299,7 +299,7 @@ CoupledErrors rotationErrors(const SortedAxes& axes) {
 
 namespace {
 
-using Range = tbb::blocked_range<std::size_t>;
+using Indices = tbb::blocked_range<std::size_t>;
 
 /// The code of a value in coarse steps, each of which is divided into 2^bits codes.
 /// \throws RuntimeFailure  the value has no code
@@ -418,7 +418,7 @@ std::vector<std::size_t> fileOrder(const QuantisedEllipsoids& q, const LatticeCh
     auto operator<=>(const Place&) const = default;
   };
   std::vector<Place> places(q.size());
-  parallelFor(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Indices(0, q.size(), kEllipsoidsPerTask), [&](const Indices& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       places[i] = {layerOf(choice, i), keyOf(q, i), i};
   });
@@ -461,7 +461,7 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
   q.lattice = choice.lattice;
   q.resize(e.size());
   q.precision = choice.precision;
-  parallelFor(Range(0, e.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Indices(0, e.size(), kEllipsoidsPerTask), [&](const Indices& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) put(e, i, q);
   });
   order = fileOrder(q, choice);
@@ -471,7 +471,7 @@ QuantisedEllipsoids quantise(const Ellipsoids& e, const LatticeChoice& choice,
 }
 
 void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids& q) {
-  parallelFor(Range(0, q.size(), kEllipsoidsPerTask), [&](const Range& range) {
+  parallelFor(Indices(0, q.size(), kEllipsoidsPerTask), [&](const Indices& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) putIntensity(intensities[i], i, q);
   });
 }

@@ -185,10 +185,11 @@ TEST(Coarser, KeepsTheSidesOfALevelSet) {
 }
 
 TEST(Coarser, DoesNotDependOnTheBoxOfTheWork) {
-  // More bricks than are decoded at once.
+  // More bricks than are decoded or made at once.
   const SparseVolume fine = test::volumeOf(
-      {}, 24, 0.0f, [](Coord v) { return float((v.x * 7 + v.y * 3 + v.z) % 31) + 1.0f; });
-  expectAverages(fine, decodeAtResolution(exactOf(fine), 8.0).volume, 8.0);
+      {}, 14, 0.0f, [](Coord v) { return float((v.x * 7 + v.y * 3 + v.z) % 31) + 1.0f; });
+  for (const double factor : {2.0, 8.0})
+    expectAverages(fine, decodeAtResolution(exactOf(fine), factor).volume, factor);
   const Box box{{0, 0, 0}, {15, 15, 15}};
   const SparseVolume part = decodeAtResolution(exactOf(fine), 2.0, {.box = box}).volume;
   EXPECT_EQ(activeVoxelCount(part), 512u);

@@ -72,7 +72,7 @@ GridDescriptor fog() {
   return descriptor;
 }
 
-Conversion converted(const SparseVolume& volume, ConvertOptions options) {
+Conversion shortlyFitted(const SparseVolume& volume, ConvertOptions options) {
   options.fit.iterations = 150;
   return convertVolume({fog(), volume}, options);
 }
@@ -83,8 +83,8 @@ double seen(const SparseVolume& volume, const StoredGrid& grid) {
 
 TEST(Tone, ShowsSmokeBetterInTheSameBytes) {
   const SparseVolume volume = smoke();
-  const Conversion with = converted(volume, {.goal = SizeGoal{900}});
-  const Conversion without = converted(volume, {.goal = SizeGoal{900}, .tone = ToneCurve{}});
+  const Conversion with = shortlyFitted(volume, {.goal = SizeGoal{900}});
+  const Conversion without = shortlyFitted(volume, {.goal = SizeGoal{900}, .tone = ToneCurve{}});
   EXPECT_TRUE(with.grid.tone.isOn());
   EXPECT_TRUE(with.byPictures);
   EXPECT_FALSE(without.grid.tone.isOn());
@@ -96,7 +96,7 @@ TEST(Tone, ReachesTheQualityOfPictures) {
   const SparseVolume volume = smoke();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
     const Conversion made =
-        converted(volume, {.goal = PictureGoal{33.0}, .representation = representation});
+        shortlyFitted(volume, {.goal = PictureGoal{33.0}, .representation = representation});
     EXPECT_NE(made.fit.end, FitEnd::kPsnrMissed);
     EXPECT_GE(seen(volume, made.grid), 33.0);
     EXPECT_LE(seen(volume, made.grid), 35.0);
@@ -109,7 +109,7 @@ TEST(Tone, ReachesTheQualityOfPictures) {
 
 TEST(Tone, OfAPresetLimitsTheErrorOfValuesToo) {
   const SparseVolume volume = smoke();
-  const Conversion made = converted(volume, {.goal = PresetGoal{}});
+  const Conversion made = shortlyFitted(volume, {.goal = PresetGoal{}});
   const VolumeMetrics m = compareVolumes(volume, decodeGrid(made.grid), {.transmittance = true});
   EXPECT_GE(m.transmittance->psnr50, presetPicturePsnr(Preset::kStandard));
   EXPECT_GE(m.psnrActive, presetPicturePsnr(Preset::kStandard) - 4.0);
@@ -117,20 +117,20 @@ TEST(Tone, OfAPresetLimitsTheErrorOfValuesToo) {
 
 TEST(Tone, IsNotUsedWhereItDoesNotServe) {
   const SparseVolume volume = smoke();
-  EXPECT_FALSE(converted(volume, {.goal = PsnrGoal{35.0}}).grid.tone.isOn());
+  EXPECT_FALSE(shortlyFitted(volume, {.goal = PsnrGoal{35.0}}).grid.tone.isOn());
   EXPECT_FALSE(
-      converted(volume, {.goal = SizeGoal{900}, .measure = Measure::kValues}).grid.tone.isOn());
-  EXPECT_FALSE(converted(volume, {.goal = LosslessGoal{}}).grid.tone.isOn());
-  EXPECT_FALSE(converted(volume, {.goal = BoundGoal{0.01, true}}).grid.tone.isOn());
-  const Conversion tube = converted(test::tubeVolume(), {.goal = SizeGoal{900}});
+      shortlyFitted(volume, {.goal = SizeGoal{900}, .measure = Measure::kValues}).grid.tone.isOn());
+  EXPECT_FALSE(shortlyFitted(volume, {.goal = LosslessGoal{}}).grid.tone.isOn());
+  EXPECT_FALSE(shortlyFitted(volume, {.goal = BoundGoal{0.01, true}}).grid.tone.isOn());
+  const Conversion tube = shortlyFitted(test::tubeVolume(), {.goal = SizeGoal{900}});
   EXPECT_FALSE(tube.grid.tone.isOn());  // its values differ too little
 }
 
 TEST(Tone, KeepsAMaskWithTheMass) {
   const SparseVolume volume = smoke();
-  const Conversion made = converted(volume, {.goal = PictureGoal{30.0},
-                                             .representation = Representation::kEllipsoids,
-                                             .storage = {.activity = Activity::kExact}});
+  const Conversion made = shortlyFitted(volume, {.goal = PictureGoal{30.0},
+                                                 .representation = Representation::kEllipsoids,
+                                                 .storage = {.activity = Activity::kExact}});
   const SparseVolume decoded = decodeGrid(made.grid);
   EXPECT_EQ(activeVoxelCount(decoded), activeVoxelCount(volume));
   EXPECT_EQ(compareVolumes(volume, decoded).iou, 1.0);
@@ -140,7 +140,7 @@ TEST(Tone, KeepsTheTotalMass) {
   const SparseVolume volume = smoke();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
     const Conversion made =
-        converted(volume, {.goal = PictureGoal{30.0}, .representation = representation});
+        shortlyFitted(volume, {.goal = PictureGoal{30.0}, .representation = representation});
     const VolumeMetrics m = compareVolumes(volume, decodeGrid(made.grid));
     EXPECT_NEAR(m.massCandidate / m.massReference, 1.0, 1e-3);
   }
@@ -167,7 +167,7 @@ TEST(RelativeBound, HoldsAtEveryVoxel) {
     for (float& value : volume.brickValues(b)) value = -value;
   for (const double share : {0.2, 0.01, 1e-4})
     for (const double floor : {1e-4, 0.03, 5.0}) {
-      const Conversion made = converted(volume, {.goal = RelativeBoundGoal{share, floor}});
+      const Conversion made = shortlyFitted(volume, {.goal = RelativeBoundGoal{share, floor}});
       EXPECT_LE(relativeError(volume, decodeGrid(made.grid), floor), share);
       EXPECT_GT(relativeError(volume, decodeGrid(made.grid), floor), 0.3 * share);
     }
@@ -197,7 +197,7 @@ TEST(RelativeBound, OfTinyAndHugeValues) {
     if (value != 0.0f) value = std::ldexp(value, int(n++ % 240) - 120);
   *std::ranges::find_if(volume.values, [](float v) { return v != 0.0f; }) = 1e-45f;
   for (const std::optional<double> floor : {std::optional<double>{}, {1e-30}, {1e30}}) {
-    const Conversion made = converted(volume, {.goal = RelativeBoundGoal{0.01, floor}});
+    const Conversion made = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.01, floor}});
     EXPECT_LE(relativeError(volume, decodeGrid(made.grid), floor.value_or(1e-45)), 0.01);
   }
 }
@@ -206,7 +206,7 @@ TEST(RelativeBound, WithABackgroundIsThatOfTheSmallestValue) {
   SparseVolume volume = smoke();
   for (float& value : volume.values) value += 280.0f;
   setBackground(280.0f, volume);
-  const Conversion made = converted(volume, {.goal = RelativeBoundGoal{0.001}});
+  const Conversion made = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.001}});
   EXPECT_FALSE(made.grid.tone.isOn());
   EXPECT_LE(relativeError(volume, decodeGrid(made.grid), 1.0), 0.001);
 }
@@ -215,9 +215,9 @@ TEST(RelativeBound, RefusesWhatIsNoBound) {
   const SparseVolume volume = smoke();
   for (const auto& goal : {RelativeBoundGoal{0.0}, RelativeBoundGoal{1.0}, RelativeBoundGoal{NAN},
                            RelativeBoundGoal{0.1, 0.0}, RelativeBoundGoal{0.1, 1e300}})
-    EXPECT_THROW((void)converted(volume, {.goal = goal}), UsageError);
-  EXPECT_THROW((void)converted(volume, {.goal = RelativeBoundGoal{0.1},
-                                        .representation = Representation::kEllipsoids}),
+    EXPECT_THROW((void)shortlyFitted(volume, {.goal = goal}), UsageError);
+  EXPECT_THROW((void)shortlyFitted(volume, {.goal = RelativeBoundGoal{0.1},
+                                            .representation = Representation::kEllipsoids}),
                UsageError);
 }
 
@@ -226,7 +226,7 @@ TEST(Tone, OfAGivenScaleServesSignedValues) {
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
     if (volume.bricks[b].x % 2 == 0)
       for (float& value : volume.brickValues(b)) value = -value;
-  const Conversion made = converted(volume, {.goal = PsnrGoal{35.0}, .tone = ToneCurve{0.1f}});
+  const Conversion made = shortlyFitted(volume, {.goal = PsnrGoal{35.0}, .tone = ToneCurve{0.1f}});
   EXPECT_EQ(made.grid.tone, ToneCurve{0.1f});
   EXPECT_FALSE(made.byPictures);
   EXPECT_GE(compareVolumes(volume, decodeGrid(made.grid)).psnrBox, 35.0);
@@ -236,7 +236,7 @@ TEST(Tone, ComesBackFromAFile) {
   const SparseVolume volume = smoke();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
     const Conversion made =
-        converted(volume, {.goal = SizeGoal{1500}, .representation = representation});
+        shortlyFitted(volume, {.goal = SizeGoal{1500}, .representation = representation});
     EsvrFile file;
     file.grids.push_back(made.grid);
     const EsvrFile back = decodeEsvr(encodeEsvr(file), "memory");

@@ -16,6 +16,7 @@
 #include "esvr/sequence_file.h"
 #include "format/sample_files.h"
 #include "support/temporary_folder.h"
+#include "support/trials.h"
 
 namespace esvr {
 namespace {
@@ -162,7 +163,7 @@ bool isFound(const std::filesystem::path& path) try {
 
 TEST_F(SequenceDamage, IsFoundAnywhere) {
   EXPECT_FALSE(isFound(path()));
-  for (std::size_t at = 0; at < whole_.size(); at += 3) {
+  for (std::size_t at = 0; at < whole_.size(); at += test::stride(3)) {
     damage(at);
     EXPECT_TRUE(isFound(path())) << at;
   }
@@ -170,7 +171,7 @@ TEST_F(SequenceDamage, IsFoundAnywhere) {
 
 TEST_F(SequenceDamage, LosesNoOtherFrames) {
   const std::size_t end = frames_.back().offset + frames_.back().bytes;
-  for (std::size_t at = frames_.front().offset; at < end; at += 3) {
+  for (std::size_t at = frames_.front().offset; at < end; at += test::stride(3)) {
     damage(at);
     SequenceReader reader(path());
     for (std::size_t i = 0; i < frames_.size(); ++i)

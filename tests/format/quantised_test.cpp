@@ -9,6 +9,7 @@
 #include "format/allocation_meter.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
+#include "support/trials.h"
 
 namespace esvr {
 namespace {
@@ -139,7 +140,7 @@ TEST(QuantisedLies, AKilobyteCannotAskForAGigabyte) {
 TEST(QuantisedLies, AnyBytesOfAStreamAreReadOrRefused) {
   const auto whole = encodeEsvr(quantisedFile(40));
   std::uint32_t state = 7;
-  for (int n = 0; n < 3000; ++n) {
+  for (int n = 0; n < test::trials(3000); ++n) {
     CraftedFile file(whole);
     auto& stored = file.section(SectionKind::kEllipsoids).stored;
     for (int k = 0; k < 4; ++k) {

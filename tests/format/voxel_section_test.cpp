@@ -18,6 +18,7 @@
 #include "format/allocation_meter.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
+#include "support/trials.h"
 
 namespace esvr {
 namespace {
@@ -248,7 +249,7 @@ TEST(VoxelLies, AKilobyteCannotAskForAGigabyte) {
 TEST(VoxelLies, AnyBytesAreReadOrRefused) {
   const auto whole = putVoxels(boundedLayer(test::tubeVolume(), 0.1, Activity::kExact));
   std::uint32_t state = 5;
-  for (int n = 0; n < 2000; ++n) {
+  for (int n = 0; n < test::trials(2000); ++n) {
     auto bytes = whole;
     for (int k = 0; k < 3; ++k) {
       state = state * 1664525u + 1013904223u;

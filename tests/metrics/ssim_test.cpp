@@ -31,7 +31,7 @@ struct DenseCase {
 
 class AgainstDenseWindows : public testing::TestWithParam<DenseCase> {};
 
-TEST_P(AgainstDenseWindows, sparseSsimIsTheMeanOfAllWindows) {
+TEST_P(AgainstDenseWindows, SlowSparseSsimIsTheMeanOfAllWindows) {
   const DenseCase c = GetParam();
   const auto a = randomVolume({.seed = c.seed, .background = c.backgroundA});
   const auto b = randomVolume({.seed = c.seed + 50, .background = c.backgroundB});

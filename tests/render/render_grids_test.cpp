@@ -136,7 +136,7 @@ TEST(RenderGrids, SlowSolveTheEquationOfEmissionAndAbsorption) {
   EXPECT_LE(error(), kMixing / 4.0) << "the error falls with the step";
 }
 
-TEST(RenderGrids, SolveItForEmissionToo) {
+TEST(RenderGrids, SlowSolveItForEmissionToo) {
   TwoVolumes two;
   two.options.further[0].absorbs = false;
   EXPECT_LE(largestDifference(two.drawn(), reference({&two.first, &two.second}, two.options)),
@@ -234,7 +234,7 @@ TEST(RenderGrids, FieldsLookAsTheirVolumes) {
   EXPECT_EQ(drawn->draw(o).rgba, once.rgba);
 }
 
-TEST(RenderGrids, AreClippedAndSeenFromInside) {
+TEST(RenderGrids, SlowAreClippedAndSeenFromInside) {
   TwoVolumes two;
   two.options.clip = PlaceBox{{20, 10, 5}, {45, 40, 30}};
   const Image clipped = two.drawn();

@@ -53,7 +53,7 @@ TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
   }
 }
 
-TEST(RenderVolume, VoxelsThatAreNoCubesAgreeWithADenseWalk) {
+TEST(RenderVolume, SlowVoxelsThatAreNoCubesAgreeWithADenseWalk) {
   const auto volume = scattered();
   for (const VoxelShape& voxel : {VoxelShape{{{{1, 0, 0}, {0, 1, 0}, {0, 0, 3}}}},
                                   VoxelShape{{{{-1, 0, 0}, {0, 2, 0}, {0, 0, 1}}}},

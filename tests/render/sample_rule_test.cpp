@@ -265,7 +265,7 @@ const std::array kBodies{OpacityCurve{{0.0, 0.0}, {1.0, 0.1}}, OpacityCurve{{0.0
                          builtInOpacity("linear")};
 
 // The picture of a face that is parallel to the faces of voxels is constant for parallel rays.
-TEST(Classification, AFaceOfAConstantBodyHasNoStripes) {
+TEST(Classification, SlowAFaceOfAConstantBodyHasNoStripes) {
   for (const OpacityCurve& curve : kBodies)
     for (const Vec3& from : {Vec3{1.0, 0.11, 0.17}, Vec3{0.12, 0.19, -1.0}}) {
       const RenderOptions o = tilted(4.0, {builtInColorMap("viridis"), curve}, from);
@@ -274,7 +274,7 @@ TEST(Classification, AFaceOfAConstantBodyHasNoStripes) {
     }
 }
 
-TEST(Classification, AFaceThatIsClippedHasNoStripes) {
+TEST(Classification, SlowAFaceThatIsClippedHasNoStripes) {
   for (const OpacityCurve& curve : kBodies)
     for (const Vec3& from : {Vec3{1.0, 0.11, 0.17}, Vec3{0.12, 0.19, -1.0}}) {
       RenderOptions o = tilted(4.0, {builtInColorMap("viridis"), curve}, from);
@@ -309,7 +309,7 @@ TEST(Classification, TheSilhouetteOfAClipBoxIsThatOfShortSteps) {
 
 // The same silhouette with 16 rays a pixel: a pixel at the edge is covered in part, so that one ray
 // errs by at most a pixel, as many as the silhouette has, but not by more.
-TEST(Classification, TheSilhouetteOfALevelSetIsCloseToThatOfManyRays) {
+TEST(Classification, SlowTheSilhouetteOfALevelSetIsCloseToThatOfManyRays) {
   RenderOptions o = tilted(30.0, levelSetSurface(3.0), {1.0, 0.35, 0.6});
   const Image drawn = renderVolume(boxLevelSet(), o);
   RenderOptions fine = o;

@@ -16,7 +16,6 @@
 namespace esvr {
 namespace {
 
-using Range = tbb::blocked_range<std::size_t>;
 constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
 /// Largest number of pairs whose tapes are kept between passes, which is about 200 MB. With more
 /// pairs, every pass computes the tapes again.
@@ -173,18 +172,19 @@ std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTap
 template <class Middle>
 void CpuIntensityPasses::pass(bool backward, const Middle& middle) {
   tbb::enumerable_thread_specific<PairTapes> scratches;
-  parallelFor(Range(0, corners_.size(), kBrickGrain), [&](const Range& range) {
-    PairTapes& scratch = scratches.local();
-    for (std::size_t b = range.begin(); b != range.end(); ++b) {
-      alignas(64) float sum[kBrickVoxels] = {};
-      const auto tapes = forward(b, scratch, sum);
-      middle(b, sum);
-      if (!backward) continue;
-      const auto begin = plan_.pairs.brickBegin[b];
-      for (std::size_t k = 0; k < tapes.size(); ++k)
-        brickKernels().projectTape(tapes[k], sum, projections_[begin + k]);
-    }
-  });
+  parallelFor(tbb::blocked_range<std::size_t>(0, corners_.size(), kBrickGrain),
+              [&](const auto& range) {
+                PairTapes& scratch = scratches.local();
+                for (std::size_t b = range.begin(); b != range.end(); ++b) {
+                  alignas(64) float sum[kBrickVoxels] = {};
+                  const auto tapes = forward(b, scratch, sum);
+                  middle(b, sum);
+                  if (!backward) continue;
+                  const auto begin = plan_.pairs.brickBegin[b];
+                  for (std::size_t k = 0; k < tapes.size(); ++k)
+                    brickKernels().projectTape(tapes[k], sum, projections_[begin + k]);
+                }
+              });
   kept_ = keeps_;
 }
 
@@ -192,7 +192,7 @@ void CpuIntensityPasses::sumPairs(float PairProjection::*value, std::vector<doub
   const auto& pairs = plan_.pairs;
   const std::size_t n = plan_.field.forms.size();
   out.assign(n, 0.0);
-  parallelFor(Range(0, n, kEllipsoidGrain), [&](const Range& range) {
+  parallelFor(tbb::blocked_range<std::size_t>(0, n, kEllipsoidGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i)
       for (auto k = pairs.ellipsoidBegin[i]; k != pairs.ellipsoidBegin[i + 1]; ++k)
         out[i] += double(projections_[pairs.pairOf[k]].*value);

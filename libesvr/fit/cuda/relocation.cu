@@ -205,7 +205,7 @@ std::uint32_t VoxelSampling::keepEachOnce(std::uint32_t count) {
 
 namespace {
 
-constexpr int kNeighbours = 27;
+constexpr int kBricksAround = 27;
 
 /// The residuals around a voxel. The window is smaller than a brick, so it lies in the voxel's
 /// brick and its 26 neighbours. Each lane of a warp holds the number of one of these bricks.
@@ -215,7 +215,7 @@ class Surroundings {
       : residual_(a.residual), local_(localOf(voxel)) {
     const int lane = int(threadIdx.x % kWarp);
     const Coord step{lane / 9 - 1, lane / 3 % 3 - 1, lane % 3 - 1};
-    number_ = lane < kNeighbours ? a.bricks.find(brickOf(voxel) + step) : kNoBrick;
+    number_ = lane < kBricksAround ? a.bricks.find(brickOf(voxel) + step) : kNoBrick;
   }
   /// The residual at an offset. All lanes must call it together. \param d  offset from the voxel
   __device__ float at(Coord d) const {

@@ -158,9 +158,6 @@ void ValueSide::addProducts(const SsimValues& values, std::size_t brick, const B
 
 // --- The loss.
 
-using Range = tbb::blocked_range<std::size_t>;
-constexpr std::size_t kBricksPerTask = 8;
-
 void check(const PaperLossInput& in) {
   if (!(in.beta >= 0.0 && in.beta <= 1.0))
     throw UsageError("the share of L1 in the loss must lie in 0 to 1, not be " +
@@ -203,6 +200,8 @@ Box rowsThatSee(const Box& support) {
 
 template <class Visit>
 void forEachBrick(std::size_t count, Visit&& visit) {
+  constexpr std::size_t kBricksPerTask = 8;
+  using Range = tbb::blocked_range<std::size_t>;
   parallelFor(Range(0, count, kBricksPerTask), [&](const Range& range) {
     for (std::size_t b = range.begin(); b != range.end(); ++b) visit(b);
   });

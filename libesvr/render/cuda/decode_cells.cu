@@ -10,7 +10,7 @@
 namespace esvr::cuda {
 namespace {
 
-constexpr int kThreads = 256, kWarps = kThreads / kWarp;
+constexpr int kDecodeThreads = 256, kWarps = kDecodeThreads / kWarp;
 
 /// The brick of level 0 that a block decodes.
 struct BlockBrick {
@@ -120,16 +120,16 @@ __device__ void addEllipsoids(const CellFieldView& field, const BlockBrick& bric
 template <class Sum>
 __device__ int sumExponent(const CellFieldView& field, const BlockBrick& brick) {
   float largest = 0.0f;
-  for (std::uint32_t k = brick.begin + threadIdx.x; k < brick.end; k += kThreads)
+  for (std::uint32_t k = brick.begin + threadIdx.x; k < brick.end; k += kDecodeThreads)
     largest = fmaxf(largest, fabsf(field.forms[field.ellipsoid[k]].form.intensity));
-  return unitExponent(blockMax<kThreads>(largest), brick.end - brick.begin,
+  return unitExponent(blockMax<kDecodeThreads>(largest), brick.end - brick.begin,
                       sizeof(Sum) > sizeof(int) ? kLimits64 : kLimits32);
 }
 
 /// Sums the ellipsoids of a brick; ends with a barrier. \return the size of a unit
 template <int kSide, class Sum>
 __device__ float sumBrick(const CellFieldView& field, const BlockBrick& brick, Sum* sums) {
-  for (int v = int(threadIdx.x); v < Cube<kSide>::kVoxels; v += kThreads) sums[v] = 0;
+  for (int v = int(threadIdx.x); v < Cube<kSide>::kVoxels; v += kDecodeThreads) sums[v] = 0;
   const int exponent = sumExponent<Sum>(field, brick);  // has a barrier
   const float units = ldexpf(1.0f, exponent);
   addEllipsoids<kSide>(field, brick, units, sums);
@@ -180,7 +180,7 @@ __device__ bool decodeAs(const CellFieldView& field, const BlockBrick& brick, Su
   const float unit = sumBrick<kSide>(field, brick, sums);
   const LocalBox box = localBox(field.box, brick.corner, kSide - 1);
   bool any = false;
-  for (int v = int(threadIdx.x); v < Cube<kSide>::kVoxels; v += kThreads) {
+  for (int v = int(threadIdx.x); v < Cube<kSide>::kVoxels; v += kDecodeThreads) {
     const float value = voxelOf(field, brick, box, Cube<kSide>::place(v),
                                 field.rule.background + float(sums[v]) * unit);
     any |= value != field.rule.background;
@@ -210,7 +210,7 @@ __device__ bool belongs(const LevelBricks& level, std::uint32_t brick) {
 }
 
 /// Each block decodes one brick of level 0.
-__global__ void __launch_bounds__(kThreads) decodeKernel(const DecodeArguments a) {
+__global__ void __launch_bounds__(kDecodeThreads) decodeKernel(const DecodeArguments a) {
   __shared__ Sums<kCellBrickSide> sums;
   const std::uint32_t number = a.bricks[blockIdx.x];
   if (!belongs(a.field.levels[0], number)) return;
@@ -237,7 +237,7 @@ __device__ void averageBrick(const CellFieldView& field, const Coord& place, int
                              Averaging& m) {
   const std::uint32_t number = numberAt(field.table, place);
   if (number == kNoCells)
-    for (int v = int(threadIdx.x); v < kBrickVoxels; v += kThreads)
+    for (int v = int(threadIdx.x); v < kBrickVoxels; v += kDecodeThreads)
       m.voxels[v] = field.rule.background;
   else
     (void)decode<kBrickSide>(field, blockBrick(field, number), m.sums, m.voxels);
@@ -296,7 +296,7 @@ __device__ bool writeVoxel(const CellFieldView& field, const Coord& at, float va
 
 /// Each block makes the voxels of a coarser brick that lie in one cube. The cube is a brick of
 /// level 0, or as large as one voxel of the level if that is larger.
-__global__ void __launch_bounds__(kThreads)
+__global__ void __launch_bounds__(kDecodeThreads)
     averageKernel(const DecodeArguments a, int level, int cubes) {
   __shared__ Averaging memory;
   const LevelBricks& bricks = a.field.levels[level];
@@ -337,10 +337,10 @@ void launchDecode(const DecodeArguments& a, int level, cudaStream_t stream) {
   if (a.count == 0) return;
   const int cubes = cubesAlong(level);
   if (level == 0)
-    decodeKernel<<<a.count, kThreads, 0, stream>>>(a);
+    decodeKernel<<<a.count, kDecodeThreads, 0, stream>>>(a);
   else
-    averageKernel<<<dim3(a.count, unsigned(cubes * cubes * cubes)), kThreads, 0, stream>>>(a, level,
-                                                                                           cubes);
+    averageKernel<<<dim3(a.count, unsigned(cubes * cubes * cubes)), kDecodeThreads, 0, stream>>>(
+        a, level, cubes);
   check(cudaGetLastError(), "decoding bricks");
 }
 

@@ -11,9 +11,9 @@ namespace {
 
 // The threads of a block, and what they share.
 
-constexpr int kSide = DrawTuning::kTileSide, kRays = DrawTuning::kTilePixels;
+constexpr int kTileSide = DrawTuning::kTileSide, kRays = DrawTuning::kTilePixels;
 constexpr int kGroups = DrawTuning::kGroups, kThreads = DrawTuning::kDrawThreads;
-constexpr int kHalves = kRays / kWarp, kRowsOfHalf = kSide / kHalves;
+constexpr int kHalves = kRays / kWarp, kRowsOfHalf = kTileSide / kHalves;
 constexpr int kStage = kWarp * kGroups;  // ellipsoids staged at once: one for each lane and group
 static_assert(kRays == 64, "two halves of a tile");
 
@@ -26,7 +26,7 @@ struct Place {
   __device__ Place() {
     const int warp = int(threadIdx.x) / kWarp;
     group = warp / kHalves, half = warp % kHalves, lane = int(threadIdx.x) % kWarp;
-    ray = half * kWarp + lane, column = ray % kSide, row = ray / kSide;
+    ray = half * kWarp + lane, column = ray % kTileSide, row = ray / kTileSide;
   }
 };
 
@@ -76,8 +76,8 @@ __device__ Work workOf(const SumArguments& a, std::uint32_t tile, const Place& p
   const TileFrame& frame = a.frame;
   const View& view = frame.view;
   Work w;
-  w.firstColumn = int(tile) % frame.tileColumns * kSide;
-  w.firstRow = (int(tile) / frame.tileColumns + frame.firstTileRow) * kSide;
+  w.firstColumn = int(tile) % frame.tileColumns * kTileSide;
+  w.firstRow = (int(tile) / frame.tileColumns + frame.firstTileRow) * kTileSide;
   const int column = w.firstColumn + place.column, row = w.firstRow + place.row;
   w.inPicture = column < frame.resolution.width && row < frame.resolution.height;
   w.firstSample = 0.0f, w.lastSample = float(frame.bins) * kBinSamples;
@@ -86,7 +86,7 @@ __device__ Work workOf(const SumArguments& a, std::uint32_t tile, const Place& p
     const double first = double(frame.firstBin) * kBinSamples;
     w.firstSample = float(range.first - first), w.lastSample = float(range.last - first);
   }
-  constexpr double kMiddle = (kSide - 1) / 2.0;
+  constexpr double kMiddle = (kTileSide - 1) / 2.0;
   w.middleUnit =
       view.unitAlong(view.planeX(w.firstColumn + kMiddle), view.planeY(w.firstRow + kMiddle)) /
       frame.step;
@@ -335,7 +335,7 @@ __device__ RayState drawPart(const SumArguments& a, Shared& s, const TilePart& i
 __device__ void writePixel(const SumArguments& a, const Place& place, const Work& work,
                            const RayState& ray) {
   if (!work.inPicture || place.group != 0) return;
-  const int row = work.firstRow + place.row - a.frame.firstTileRow * kSide;
+  const int row = work.firstRow + place.row - a.frame.firstTileRow * kTileSide;
   const int column = work.firstColumn + place.column;
   const PixelColor c = a.rule.finished(ray);
   a.pixels[std::size_t(row) * a.frame.resolution.width + column] =

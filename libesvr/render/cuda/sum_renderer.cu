@@ -24,7 +24,7 @@ namespace {
 // Lists. An ellipsoid is first projected. Its entries are counted, each list gets its place in
 // memory, and the lists are filled in any order.
 
-constexpr int kSide = DrawTuning::kTileSide;
+constexpr int kTileSide = DrawTuning::kTileSide;
 
 /// Factors that widen bounds, so that rounding them to float32 never excludes anything.
 constexpr double kWider = 1.0 + 1e-6, kNarrower = 1.0 - 1e-6;
@@ -77,8 +77,8 @@ struct Columns {
 __device__ __noinline__ Columns columnsIn(const TileFrame& frame, const Footprint& p, int tileRow) {
   Columns c{p.firstColumn, p.lastColumn};
   if (p.everywhere) return c;
-  const int lastRow = min(tileRow * kSide + kSide, frame.resolution.height) - 1;
-  const PixelSpan span = columnsBetween(outlineIn(p), tileRow * kSide, lastRow);
+  const int lastRow = min(tileRow * kTileSide + kTileSide, frame.resolution.height) - 1;
+  const PixelSpan span = columnsBetween(outlineIn(p), tileRow * kTileSide, lastRow);
   const int width = frame.resolution.width;
   if (!(span.low <= span.high)) return {1, 0};
   return {max(c.first, ellipsoid_math::firstPixel(span.low, width)),
@@ -88,10 +88,10 @@ __device__ __noinline__ Columns columnsIn(const TileFrame& frame, const Footprin
 /// The bins that an ellipsoid may reach in a tile, counted from the frame's first bin.
 __device__ __noinline__ Columns binsIn(const TileFrame& frame, const Footprint& p, int tileColumn,
                                        int tileRow) {
-  const int firstColumn = tileColumn * kSide, firstRow = tileRow * kSide;
+  const int firstColumn = tileColumn * kTileSide, firstRow = tileRow * kTileSide;
   const UnitRange unit =
-      unitRange(frame.view, firstColumn, min(firstColumn + kSide, frame.resolution.width) - 1,
-                firstRow, min(firstRow + kSide, frame.resolution.height) - 1);
+      unitRange(frame.view, firstColumn, min(firstColumn + kTileSide, frame.resolution.width) - 1,
+                firstRow, min(firstRow + kTileSide, frame.resolution.height) - 1);
   const BinRange bins = binsOf(p.nearest, p.farthest, unit, frame.step);
   const std::int64_t last = frame.firstBin + frame.bins - 1;
   return {int(max(bins.first, frame.firstBin) - frame.firstBin),
@@ -103,10 +103,11 @@ struct TileRectangle {
   int firstColumn, columns, firstRow, rows;
 };
 __device__ TileRectangle tilesOf(const TileFrame& frame, const Footprint& p) {
-  const int firstRow = max(p.firstRow / kSide, frame.firstTileRow);
-  const int lastRow = min(p.lastRow / kSide, frame.firstTileRow + frame.tileRows - 1);
-  const int firstColumn = p.firstColumn / kSide;
-  return {firstColumn, p.lastColumn / kSide - firstColumn + 1, firstRow, lastRow - firstRow + 1};
+  const int firstRow = max(p.firstRow / kTileSide, frame.firstTileRow);
+  const int lastRow = min(p.lastRow / kTileSide, frame.firstTileRow + frame.tileRows - 1);
+  const int firstColumn = p.firstColumn / kTileSide;
+  return {firstColumn, p.lastColumn / kTileSide - firstColumn + 1, firstRow,
+          lastRow - firstRow + 1};
 }
 
 /// Calls visit(list) for each list that an ellipsoid belongs to. The number of a list is
@@ -118,8 +119,8 @@ __device__ void visitLists(const TileFrame& frame, const Footprint& p, Lanes lan
     const int row = tiles.firstRow + t / tiles.columns;
     const int column = tiles.firstColumn + t % tiles.columns;
     const Columns columns = columnsIn(frame, p, row);
-    if (columns.first > min(columns.last, column * kSide + kSide - 1) ||
-        columns.last < column * kSide)
+    if (columns.first > min(columns.last, column * kTileSide + kTileSide - 1) ||
+        columns.last < column * kTileSide)
       continue;
     const int tile = (row - frame.firstTileRow) * frame.tileColumns + column;
     const Columns bins = binsIn(frame, p, column, row);
@@ -128,8 +129,8 @@ __device__ void visitLists(const TileFrame& frame, const Footprint& p, Lanes lan
 }
 
 __device__ bool isSeen(const TileFrame& frame, const Footprint& p) {
-  return p.firstRow <= p.lastRow && p.lastRow / kSide >= frame.firstTileRow &&
-         p.firstRow / kSide < frame.firstTileRow + frame.tileRows;
+  return p.firstRow <= p.lastRow && p.lastRow / kTileSide >= frame.firstTileRow &&
+         p.firstRow / kTileSide < frame.firstTileRow + frame.tileRows;
 }
 
 __device__ bool inManyLists(const TileFrame& frame, const Footprint& p) {
@@ -306,7 +307,7 @@ std::vector<PackedEllipsoid> numbered(std::vector<PackedEllipsoid> ellipsoids) {
   return ellipsoids;
 }
 
-int tilesAlong(int pixels) { return (pixels + kSide - 1) / kSide; }
+int tilesAlong(int pixels) { return (pixels + kTileSide - 1) / kTileSide; }
 
 /// Device memory of a field, which is kept from picture to picture.
 struct FieldMemory {
@@ -519,7 +520,8 @@ void SumRenderer::reserve(const TileFrame& f) {
   const cudaStream_t stream = stream_.get();
   const std::size_t tiles = std::size_t(f.tiles()), lists = tiles * std::size_t(f.bins);
   const std::size_t parts = tiles * std::size_t(f.parts);
-  const int rows = std::min(f.tileRows * kSide, f.resolution.height - f.firstTileRow * kSide);
+  const int rows =
+      std::min(f.tileRows * kTileSide, f.resolution.height - f.firstTileRow * kTileSide);
   makeRoom(band_.counters, 1, stream);
   makeRoom(band_.counts, lists, stream);
   makeRoom(band_.ends, lists, stream);
@@ -626,8 +628,8 @@ void SumRenderer::count(const TileFrame& f, const FrameCounters& c) {
 }
 
 void SumRenderer::download(const TileFrame& f, Image& image) {
-  const int firstRow = f.firstTileRow * kSide;
-  const int rows = std::min(f.tileRows * kSide, f.resolution.height - firstRow);
+  const int firstRow = f.firstTileRow * kTileSide;
+  const int rows = std::min(f.tileRows * kTileSide, f.resolution.height - firstRow);
   const std::size_t width = std::size_t(f.resolution.width);
   check(cudaMemcpyAsync(&image.rgba[4 * width * std::size_t(firstRow)], band_.pixels.data(),
                         width * std::size_t(rows) * sizeof(float4), cudaMemcpyDeviceToHost,

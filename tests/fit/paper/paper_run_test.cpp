@@ -149,13 +149,13 @@ TEST_P(PaperRunOn, LowersTheErrorAndSaysWhatItDid) {
   EXPECT_EQ(result.field.kernel.form, KernelForm::kPaper);
 }
 
-TEST_P(PaperRunOn, LeavesTheCountThatIsAsked) {
+TEST_P(PaperRunOn, SlowLeavesTheCountThatIsAsked) {
   PaperFitOptions options;
   options.count = 120;
   EXPECT_EQ(run(shortMethod(), {}, options).record.prunes.back().after, 120u);
 }
 
-TEST_P(PaperRunOn, WithoutPruningAddsUpToTheCount) {
+TEST_P(PaperRunOn, SlowWithoutPruningAddsUpToTheCount) {
   PaperFitOptions options;
   options.count = 400;
   PaperMethod method = shortMethod();
@@ -164,7 +164,7 @@ TEST_P(PaperRunOn, WithoutPruningAddsUpToTheCount) {
   EXPECT_EQ(run(method, {}, options).fit.curve.end()[-2].ellipsoids, 400u);
 }
 
-TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
+TEST_P(PaperRunOn, SlowWithoutDensifyingOnlyMovesThePoints) {
   PaperMethod method = shortMethod();
   method.densify = false;
   method.prunes.clear();
@@ -173,7 +173,7 @@ TEST_P(PaperRunOn, WithoutDensifyingOnlyMovesThePoints) {
   EXPECT_GT(result.curve.back().psnrBox, result.curve.front().psnrBox);
 }
 
-TEST_P(PaperRunOn, LearnsKOfEachEllipsoid) {
+TEST_P(PaperRunOn, SlowLearnsKOfEachEllipsoid) {
   PaperMethod method = shortMethod();
   method.learnK = true;
   const FitResult result = run(method).fit;

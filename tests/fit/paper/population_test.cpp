@@ -291,7 +291,7 @@ double sampledScore(const PaperEllipsoid& p, const KernelKind& kind) {
   return sum;
 }
 
-TEST(RayScores, AgreeWithDenselySampledRays) {
+TEST(RayScores, SlowAgreeWithDenselySampledRays) {
   for (const KernelKind kind : {KernelKind{}, KernelKind{.gaussian = true}})
     for (const auto& p : {seenEllipsoid({10.2, 11.7, 9.4}, {3, 2, 1}, 0.5),
                           seenEllipsoid({11, 11, 11}, {5, 0.7, 1}, -2.0)}) {
