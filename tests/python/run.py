@@ -6,12 +6,19 @@ Exits with 77 if pytest or NumPy is missing, so that CTest shows the tests as sk
 """
 import sys
 
-sys.dont_write_bytecode = True
-sys.path.insert(0, sys.argv[1])
-try:
-    import numpy  # noqa: F401
-    import pytest
-except ImportError as missing:
-    print(f"skipped: {missing} (Debian: python3-numpy, python3-pytest)")
-    sys.exit(77)
-sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-rs", f"--junit-xml={sys.argv[2]}", *sys.argv[3:]]))
+
+def main():
+    sys.dont_write_bytecode = True
+    sys.path.insert(0, sys.argv[1])
+    try:
+        import numpy  # noqa: F401
+        import pytest
+    except ImportError as missing:
+        print(f"skipped: {missing} (Debian: python3-numpy, python3-pytest)")
+        return 77
+    return pytest.main(["-q", "-p", "no:cacheprovider", "-rs", f"--junit-xml={sys.argv[2]}", *sys.argv[3:]])
+
+
+# A process that multiprocessing starts imports this file, and must not run the tests again.
+if __name__ == "__main__":
+    sys.exit(main())
