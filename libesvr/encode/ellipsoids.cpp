@@ -70,17 +70,21 @@ Plan planOf(const Job& job) {
   const double wanted = plannedIterations(job.options.fit);
   const double bricks = double(std::max<std::size_t>(job.input.source.brickCount(), 1));
   const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;
-  const double affordable = onGpu ? 1.0 : tuning.bricksOfWholeFit / bricks;
+  const double shortest = std::min<double>(tuning.leastShortIterations, wanted);
+  const double inTime = onGpu ? wanted : wanted * tuning.bricksOfWholeFit / bricks;
+  const double inAMinute = std::max(tuning.leastWholeShare * wanted, shortest) *
+                           std::min(1.0, tuning.bricksInAMinute / bricks);
+  const double affordable = std::max(inTime, inAMinute);
   const double most = std::max(effortFactor(effort), 1.0),
                least = std::min(effortFactor(effort), 1.0);
-  const double usual = wanted * std::min(1.0, most * affordable);
-  const double shortest = std::min<double>(tuning.leastShortIterations, wanted);
+  const double usual = std::min(wanted, most * affordable);
   Plan plan;
   plan.fitsInTime = effort > kLeastEffort && usual >= shortest;
   plan.wholeIterations = std::uint32_t(std::ceil(std::max({least * usual, shortest, 1.0})));
   plan.shortIterations = std::min(plan.wholeIterations,
                                   std::clamp(plan.wholeIterations / 4, tuning.leastShortIterations,
                                              tuning.mostShortIterations));
+  plan.improves = inTime >= inAMinute || effort > kUsualEffort;
   plan.wholeFits = job.options.fit.preset == Preset::kHigh ? 3 : 2;
   return plan;
 }
@@ -215,7 +219,7 @@ constexpr int kMostDrafts = 3;
 /// from the PSNR than kFar times its number of ellipsoids, one with as many times fewer shows the slope.
 constexpr double kMostOfFirstDraft = 6000.0, kMostOfScout = 2000.0, kFar = 4.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
-constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01;
+constexpr double kMaxGrowth = 8.0, kMinGrowth = 1.01, kGrowthAfterMiss = 1.03;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
 /// size is given up, and the share of a size that may stay unused: a hundredth.
 constexpr double kMoreEach = 1.25;
@@ -564,12 +568,23 @@ std::optional<Conversion> EllipsoidSearch::run() {
   return goal_.psnr ? runToPsnr() : runToSize();
 }
 
+/// The smallest number of ellipsoids of the next whole fit. Of few, one or two decide, so that the last fit that may be made
+/// has more than those that missed the PSNR.
+double EllipsoidSearch::leastAfterMisses() const {
+  double most = 0.0;
+  for (const Attempt& a : attempts_) {
+    if (a.psnr > *goal_.psnr) return 1.0;
+    most = std::max(most, double(a.asked));
+  }
+  return attempts_.empty() ? 1.0 : std::ceil(kGrowthAfterMiss * most) + 1.0;
+}
+
 /// The number of ellipsoids grows with their PSNR: a root search over its logarithm.
 std::optional<Conversion> EllipsoidSearch::runToPsnr() {
   RootSearch search({0.0, std::log2(capped(HUGE_VAL)), std::log2(kMinGrowth)}, aim(), slope_,
                     std::log2(capped(forecastCount(aim()))));
   while (!draft_->cancelled() && int(attempts_.size()) < plan_.wholeFits) {
-    const double count = std::max(std::floor(std::exp2(search.next())), 1.0);
+    const double count = capped(std::max(std::floor(std::exp2(search.next())), leastAfterMisses()));
     const bool isRepeated =
         std::ranges::any_of(attempts_, [&](const Attempt& a) { return double(a.asked) == count; });
     if (isRepeated) break;
@@ -582,7 +597,8 @@ std::optional<Conversion> EllipsoidSearch::runToPsnr() {
     const Attempt& last = attempts_.back();
     const double over = last.psnr - *goal_.psnr;
     const bool allThereIs = last.fit.deviceFull || double(last.asked) >= capped(HUGE_VAL);
-    if (last.cancelled() || (over >= margin_.min && over <= margin_.max)) break;
+    if (last.cancelled() || (over >= margin_.min && (over <= margin_.max || !plan_.improves)))
+      break;
     if (over < margin_.min && allThereIs) break;
     search.learn(last.psnr);
   }

@@ -111,6 +111,7 @@ class EllipsoidSearch {
 
   [[nodiscard]] double behind() const;
   [[nodiscard]] double aim() const;
+  [[nodiscard]] double leastAfterMisses() const;
   [[nodiscard]] double capped(double count) const;
   [[nodiscard]] double forecastCount(double psnr) const;
   [[nodiscard]] std::optional<Conversion> runToPsnr();

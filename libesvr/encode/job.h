@@ -59,6 +59,7 @@ template <class Work>
 struct Plan {
   std::uint32_t wholeIterations = 0, shortIterations = 0;
   int wholeFits = 2;       ///< largest number of whole fits, of which a continued one is one
+  bool improves = true;    ///< whether a whole fit for a PSNR may follow one that reaches it
   bool fitsInTime = true;  ///< false: a fit would take too long for the effort
 };
 [[nodiscard]] Plan planOf(const Job& job);

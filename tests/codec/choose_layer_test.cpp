@@ -204,8 +204,38 @@ TEST(BoundedLayer, IsExactWhereFloat32IsNoFinerThanTheBound) {
 
 TEST(BoundedLayer, RefusesAnInvalidBound) {
   const SparseVolume volume = test::tubeVolume();
-  for (const double bound : {0.0, -1.0, std::nan(""), HUGE_VAL})
+  for (const double bound : {0.0, -1.0, std::nan(""), HUGE_VAL}) {
     EXPECT_THROW((void)boundedLayer(volume, bound, Activity::kExact), UsageError);
+    EXPECT_THROW((void)nearestLayer(volume, bound, Activity::kExact), UsageError);
+  }
+}
+
+// boundedLayer() decodes what it makes, and takes another lattice where a value misses the bound.
+TEST(NearestLayer, IsTheFirstLatticeOfTheBound) {
+  for (const double scale : {1e-30, 1.0, 1e30})
+    for (const double share : {0.1, 0.01})
+      for (const Activity activity : {Activity::kExact, Activity::kByValue})
+        for (const RoundedSigns signs : {RoundedSigns::kMayChange, RoundedSigns::kKept}) {
+          const SparseVolume volume = made([&](double r) { return float(r * scale); });
+          const double bound = share * scale;
+          const VoxelLayer nearest = nearestLayer(volume, bound, activity, signs);
+          EXPECT_EQ(nearest, boundedLayer(volume, bound, activity, signs)) << scale << " " << share;
+          EXPECT_EQ(nearest.form, VoxelForm::kQuantised);
+        }
+}
+
+TEST(NearestLayer, MissesTheBoundByTheRoundingOfFloatsAtMost) {
+  // The steps are a few times as wide as those of the floats.
+  const SparseVolume volume = made([](double r) { return float(r); });
+  const double bound = 0x1p-22;
+  const VoxelLayer layer = nearestLayer(volume, bound, Activity::kExact);
+  EXPECT_EQ(layer.form, VoxelForm::kQuantised);
+  EXPECT_LE(largestError(volume, layer), bound + 0x1p-25);
+}
+
+TEST(NearestLayer, IsExactWhereFloat32IsNoFinerThanTheBound) {
+  const SparseVolume volume = made([](double r) { return float(1e8 + std::floor(r * 1e5)); });
+  EXPECT_EQ(largestError(volume, nearestLayer(volume, 1e-3, Activity::kExact)), 0.0);
 }
 
 constexpr double kBound = 0.02;

@@ -126,6 +126,23 @@ TEST(EllipsoidSearch, SaysWhatASizeThatIsTooSmallNeeds) {
   EXPECT_FALSE(made.search.run());
 }
 
+// One ellipsoid is off by its cut border alone, and a second one hardly helps.
+TEST(EllipsoidSearch, ReachesAPsnrThatOneEllipsoidMissesByLittle) {
+  const SparseVolume blob = test::volumeOf({}, 5, 0.0f, [](Coord v) {
+    const double x = v.x - 19.5, y = v.y - 19.5, z = v.z - 19.5;
+    const double value = std::exp(-8.0 / (19.5 * 19.5) * (x * x + y * y + z * z));
+    return value < 0.01 ? 0.0f : float(value);
+  });
+  for (const double psnr : {36.0, 38.0, 40.0, 42.0}) {
+    ConvertOptions options;
+    options.goal = PsnrGoal{psnr};
+    options.representation = Representation::kEllipsoids;
+    const Conversion found = convertVolume({{}, blob}, options);
+    EXPECT_EQ(found.fit.end, FitEnd::kPsnrReached) << psnr;
+    EXPECT_LT(bytesAdded(found.grid), 600u) << psnr;
+  }
+}
+
 TEST(Plan, GivesLessTimeToLargeVolumesOfACpuAndToLittleEffort) {
   const SparseVolume volume = test::noiseVolume(2);
   const GridDescriptor descriptor;
@@ -149,7 +166,11 @@ TEST(Plan, GivesLessTimeToLargeVolumesOfACpuAndToLittleEffort) {
   EXPECT_GT(planFor(large, kUsualEffort + 1).wholeIterations,
             planFor(large, kUsualEffort).wholeIterations);
   EXPECT_LE(planFor(large, kMostEffort).wholeIterations, before);
-  large.bricks.resize(200'000);
+  large.bricks.resize(40'000);
+  const encode::Plan plan = planFor(large, kUsualEffort);
+  EXPECT_GE(plan.wholeIterations, 160u) << "fewer do not show what ellipsoids can reach";
+  EXPECT_GE(plan.shortIterations, 50u);
+  large.bricks.resize(400'000);
   EXPECT_FALSE(planFor(large, kUsualEffort).fitsInTime);
 }
 

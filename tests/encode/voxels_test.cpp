@@ -94,6 +94,20 @@ TEST_F(VoxelSearch, StoresAHandfulOfValuesExactly) {
   EXPECT_EQ(decodeGrid(found.grid).values, volume_.values);
 }
 
+TEST_F(VoxelSearch, EndsWhereExactVoxelsTakeLittleMoreThanTheirMask) {
+  options_.storage.activity = Activity::kExact;
+  test::Random random(11);
+  volume_ =
+      test::volumeOf({}, 3, 0.0f, [&](Coord) { return random(0.0, 1.0) < 0.4 ? 0.7f : 0.0f; });
+  const auto found = forPsnr(30.0);
+  EXPECT_EQ(decodeGrid(found.grid).values, volume_.values);
+  EXPECT_FALSE(found.plateau.tried) << "no lattice takes fewer bytes than the mask";
+  // Two values that the mask does not tell apart take more than it, so that lattices are tried.
+  volume_ =
+      test::volumeOf({}, 3, 0.0f, [&](Coord) { return random(0.0, 1.0) < 0.4 ? 0.7f : 0.9f; });
+  EXPECT_TRUE(forPsnr(30.0).plateau.tried);
+}
+
 TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
   test::Random random(11);
   volume_ = test::volumeOf({}, 3, 0.0f,

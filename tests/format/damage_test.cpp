@@ -44,13 +44,15 @@ TEST(Damage, TruncationAtEveryByteIsRefused) {
 
 TEST(Damage, SlowAnyBitFlippedIsRefused) {
   Bytes bytes = encodeEsvr(smallFile());
-  for (std::size_t i = 0; i < bytes.size(); ++i) {
+  // A checksum sees every bit of a section alike; the bytes before the sections have meanings of their own.
+  constexpr std::size_t kHead = 256;
+  for (std::size_t i = 0; i < bytes.size(); ++i)
     for (int bit = 0; bit < 8; ++bit) {
+      if (i >= kHead && bit != int(i % 8)) continue;
       bytes[i] ^= std::byte(1 << bit);
       EXPECT_TRUE(refused(bytes)) << "byte " << i << ", bit " << bit;
       bytes[i] ^= std::byte(1 << bit);
     }
-  }
 }
 
 TEST(Damage, BytesAfterTheEndAreRefused) {
