@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -440,6 +442,17 @@ void reportTransform(const Options& options, const std::vector<Scene>& scenes) {
           "as cubes");
 }
 
+/// Warns that float32 has no digits left for the colors of values.
+void reportTinyValues(const Options& options, const std::vector<Scene>& scenes) {
+  for (const Scene& scene : scenes) {
+    const float largest = std::max(std::abs(scene.data.min), std::abs(scene.data.max));
+    if (largest == 0.0f || largest >= std::numeric_limits<float>::min()) continue;
+    cli::Log(kProgram, options.verbosity)
+        .warning(options.input.string() + ", " + scene.grid +
+                 ": its values are below 1.2e-38, and pictures do not tell them apart");
+  }
+}
+
 /// Warns that --between sum has no effect on a grid. \return whether it has none
 bool reportBetween(const Options& options, const std::vector<Scene>& scenes) {
   if (options.between != Between::kSum || hasSum(scenes.front())) return false;
@@ -474,6 +487,7 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
   InputFrames input(options);
   const auto all = scenesOfAll(options, input);
   reportTransform(options, all);
+  reportTinyValues(options, all);
   RenderOptions r = renderOptions(options, all);
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
@@ -504,6 +518,7 @@ void run(const Options& options) {
   if (options.frames) return drawSequence(options, settings, interrupts.token());
   auto scenes = readScenes(sceneFile(options, options.input));
   reportTransform(options, scenes);
+  reportTinyValues(options, scenes);
   (void)reportBetween(options, scenes);
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);

@@ -44,6 +44,19 @@ TEST_F(EsvrRender, TheSumIsShownBetweenVoxelsWhereAskedFor) {
   expectRefused({"--between", "nothing"}, 2, "--between");
 }
 
+TEST_F(EsvrRender, ValuesThatPicturesDoNotTellApartHaveAWarning) {
+  const std::string warning = "its values are below 1.2e-38";
+  VolumeGrid grid = readGrid(folder_ / "in.vdb", "density");
+  for (const float factor : {1e-30f, 1e-10f}) {
+    for (float& v : grid.volume.values) v *= factor;
+    writeGrids(folder_ / "tiny.vdb", {}, std::span(&grid, 1), {.overwrite = true});
+    const ProgramRun run = draw("tiny.vdb", "tiny.png", {"-f"});
+    EXPECT_EQ(run.exitCode, 0);
+    const bool isWarned = run.err.find(warning) != std::string::npos;
+    EXPECT_EQ(isWarned, factor == 1e-10f) << "values of 1e-40 after the second factor";
+  }
+}
+
 TEST_F(EsvrRender, AGridWithoutASumIsDrawnFromItsVoxelsWithAWarning) {
   const std::string warning = "--between sum has no effect";
   EXPECT_THAT(draw("in.vdb", "vdb.png", {"--between", "sum"}).err, HasSubstr(warning));
