@@ -26,8 +26,8 @@ NOT_MEASURED = "not measured"
 
 # Why a case is beyond float32, and where users meet it.
 REASONS = {
-    "k = 5000": "the paper's kernel falls to its end within a five-thousandth of its width, and float32 knows m to 1e-7. The "
-                "default fit keeps kappa at 30 or below; only `--method paper` makes sharper ellipsoids, and k = 500 passes.",
+    "k = 5000": "its edge lies where m is about 5000, and float32 has an error of m in proportion to m. The default fit keeps "
+                "kappa at 30 or below; only `--method paper` makes sharper ellipsoids, and k = 500 passes.",
     "denormals": "a GPU takes numbers below 1.2e-38 as 0, so that CUDA draws nothing of a volume whose largest value is below; "
                  "`esvr-render` warns of it. `esvr2vdb` decodes on the CPU and writes such values.",
     "signed data that cancel": "a sum that is 2,487 times smaller than its terms has three digits fewer, in any order. A GPU adds "
@@ -318,7 +318,7 @@ def verdict(cases):
             "are the first rows of each table.\n\n")
     known = [textwrap.fill(f"- **{c.name}**: {REASONS[c.name]}", 120, subsequent_indent="  ")
              for c in failing if c.name in REASONS]
-    return text + "\n".join(known) + "\n\n"
+    return text + "".join(reason + "\n" for reason in known) + "\n"
 
 
 def load(docs):

@@ -166,10 +166,12 @@ TEST(Plan, GivesLessTimeToLargeVolumesOfACpuAndToLittleEffort) {
   EXPECT_GT(planFor(large, kUsualEffort + 1).wholeIterations,
             planFor(large, kUsualEffort).wholeIterations);
   EXPECT_LE(planFor(large, kMostEffort).wholeIterations, before);
+  EXPECT_TRUE(planFor(large, kUsualEffort).improves);
   large.bricks.resize(40'000);
   const encode::Plan plan = planFor(large, kUsualEffort);
   EXPECT_GE(plan.wholeIterations, 160u) << "fewer do not show what ellipsoids can reach";
   EXPECT_GE(plan.shortIterations, 50u);
+  EXPECT_FALSE(plan.improves) << "a fit that reaches its PSNR is the last one";
   large.bricks.resize(400'000);
   EXPECT_FALSE(planFor(large, kUsualEffort).fitsInTime);
 }

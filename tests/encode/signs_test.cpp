@@ -99,9 +99,9 @@ TEST_P(NarrowBand, KeepsTheSignsOfVoxels) {
       *std::ranges::min_element(volume_.values, {}, [](float v) { return std::abs(v); });
   ASSERT_LT(std::abs(nearest), 0.05 * voxel_) << "rounding has no sign to change";
   for (const Goal& goal :
-       {Goal{PsnrGoal{20.0}}, Goal{PsnrGoal{35.0}}, Goal{PsnrGoal{50.0}}, Goal{PresetGoal{}},
-        Goal{BoundGoal{0.4 * voxel_}}, Goal{BoundGoal{0.02, true}}, Goal{SizeGoal{2500}},
-        Goal{LosslessGoal{}}}) {
+       {Goal{PsnrGoal{20.0}}, Goal{PsnrGoal{30.0}}, Goal{PsnrGoal{40.0}}, Goal{PsnrGoal{50.0}},
+        Goal{PresetGoal{}}, Goal{BoundGoal{0.4 * voxel_}}, Goal{BoundGoal{0.02, true}},
+        Goal{SizeGoal{2500}}, Goal{LosslessGoal{}}}) {
     const Conversion conversion = bandOf(volume_, goal, Representation::kVoxels);
     EXPECT_TRUE(conversion.grid.voxels);
     expectSameSigns(volume_, conversion.grid);

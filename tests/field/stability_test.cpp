@@ -60,7 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(StabilityShape{"usual", {}},
                     StabilityShape{"needles", {.smallest = 0.1, .aspect = 1000.0}},
                     StabilityShape{"subvoxel", {.smallest = 0.1, .aspect = 2.0}},
-                    StabilityShape{"huge", {.count = 2, .smallest = 100.0, .aspect = 2.0}},
+                    StabilityShape{"huge", {.count = 2, .smallest = 150.0, .aspect = 2.0}},
                     StabilityShape{"gaussian", {.kappa = -30.0f}},
                     StabilityShape{"hard", {.smallest = 0.5, .kappa = 30.0f}},
                     StabilityShape{"box", {.smallest = 0.1, .kappa = 5000.0f}},

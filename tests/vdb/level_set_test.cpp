@@ -108,8 +108,8 @@ TEST_F(LevelSetFile, SlowRealFileOfACubeKeepsAllSigns) {
   const auto path = test::dataDir() / "cube_levelset.vdb";
   const VolumeGrid source = readGrid(path, "ls_cube");
   const auto grid = openvdb::gridPtrCast<FloatGrid>(test::load(path, "ls_cube"));
-  for (const Goal& goal :
-       {Goal{SizeGoal{std::filesystem::file_size(path) / 50}}, Goal{PsnrGoal{30.0}}})
+  for (const Goal& goal : {Goal{SizeGoal{std::filesystem::file_size(path) / 50}},
+                           Goal{PsnrGoal{30.0}}, Goal{BoundGoal{0.01, true}}, Goal{PresetGoal{}}})
     EXPECT_EQ(signErrors(*grid, *throughAFile(converted(source, goal))), 0u);
 }
 
