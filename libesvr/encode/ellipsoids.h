@@ -23,6 +23,11 @@ struct Attempt {
   [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
 };
 
+/// The quality, dB, of a fit for which a number of ellipsoids was wanted.
+struct FitPoint {
+  double count = 0.0, psnr = 0.0;
+};
+
 /// A short fit of few ellipsoids, which shows what suits a job.
 [[nodiscard]] Attempt scoutingFit(const Job& job);
 
@@ -104,7 +109,7 @@ class EllipsoidSearch {
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
   [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
-  void learnSlope(const Attempt& other);
+  void learnFrom(const Attempt& other);
   void draftNearPsnr();
   void decideSigns();
   void forecast();
@@ -113,7 +118,8 @@ class EllipsoidSearch {
   [[nodiscard]] double aim() const;
   [[nodiscard]] double leastAfterMisses() const;
   [[nodiscard]] double capped(double count) const;
-  [[nodiscard]] double forecastCount(double psnr) const;
+  [[nodiscard]] double nextCount() const;
+  [[nodiscard]] bool isEnough() const;
   [[nodiscard]] std::optional<Conversion> runToPsnr();
   [[nodiscard]] std::optional<Conversion> runToSize();
   [[nodiscard]] std::optional<CompactResult> filled(const Attempt& attempt);
@@ -126,12 +132,13 @@ class EllipsoidSearch {
   bool compact_, saturates_;
   Rounding rounding_;
   Margin margin_;
-  double slope_ = kDbPerDoubling;
+  double slope_;               ///< growth of the quality by twice the ellipsoids, dB
   bool slopeIsKnown_ = false;  ///< from two short fits
   bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below Goal::below
   std::uint64_t maxCount_;
   Decision bothSigns_;
-  std::optional<Attempt> draft_;
+  std::optional<Attempt> draft_;           ///< the last short fit
+  std::vector<FitPoint> drafted_;          ///< all of them that are like it
   double price_ = kTuning.usualBytesEach;  ///< expected bytes of an ellipsoid
   std::uint64_t besides_ = 0;              ///< bytes of the grid's other sections
   std::uint64_t expectedBytes_ = 0, needed_ = 0;

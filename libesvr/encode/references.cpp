@@ -195,6 +195,8 @@ StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
   StoredGrid expected;
   expected.descriptor = grids[grid].descriptor;
   expected.tone = grids[grid].tone;
+  expected.farBackground = grids[grid].farBackground;
+  expected.field.background = grids[grid].field.background;
   if (!reference.grid) {
     expected.voxels = partOf(*grids[grid].voxels, {});
     return expected;

@@ -19,7 +19,7 @@ constexpr std::size_t kMostShared = std::size_t{1} << 25;
 constexpr std::size_t kMostChosenAgain = std::size_t{1} << 21;
 /// Largest number of voxels in bricks for each byte that they take. Where they take fewer bytes,
 /// choosing them again saves little.
-constexpr std::size_t kMostVoxelsPerByte = 512;
+constexpr std::size_t kMostVoxelsPerByte = 256;
 
 /// Largest number of voxels in bricks of a grid that is coded in the way of related grids where no other grid is like it.
 /// It saves some 50 bytes of grids of few voxels.

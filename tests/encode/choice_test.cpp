@@ -130,6 +130,28 @@ TEST(ChoiceForAPreset, SlowHasItsQualityOverTheActiveVoxels) {
   }
 }
 
+/// A ball with a soft border, which a dozen ellipsoids approximate.
+SparseVolume ballVolume() {
+  return test::volumeOf({}, 8, 0.0f, [](Coord v) {
+    const double r = std::hypot(v.x - 31.5, v.y - 31.5, v.z - 31.5) / 32.0;
+    const double value = 0.5 - 0.5 * std::tanh((r - 0.6) / 0.15);
+    return value > 0.01 ? float(value) : 0.0f;
+  });
+}
+
+TEST(ChoiceForAPreset, SlowTakesAFewEllipsoidsThoughTheFirstFitHasManyMore) {
+  const SparseVolume volume = ballVolume();
+  ConvertOptions options;
+  options.goal = PresetGoal{};
+  GridDescriptor descriptor;
+  descriptor.gridClass = GridClass::kFogVolume;
+  const Conversion conversion = convertVolume({descriptor, volume}, options);
+  ASSERT_FALSE(conversion.grid.voxels);
+  EXPECT_LT(conversion.grid.field.ellipsoidCount(), 100u);
+  ASSERT_TRUE(conversion.choice && conversion.choice->voxels);
+  EXPECT_LT(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
+}
+
 TEST(ChoiceForAPreset, CountsTheActiveVoxelsOfTheBox) {
   const SparseVolume volume = test::noiseVolume(2);
   ConvertOptions options;

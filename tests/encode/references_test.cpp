@@ -65,6 +65,15 @@ TEST(ExpectedFrom, HasTheMappedValuesOfTheReference) {
   }
 }
 
+TEST(ExpectedFrom, HasTheFarBackgroundOfTheGridThatRefers) {
+  auto all = grids();
+  all[3].farBackground = true;
+  all[3].field.background = 7.0f;
+  const StoredGrid expected = expectedFrom(all, 3, {1, kGain, kOffset});
+  EXPECT_TRUE(expected.farBackground) << "a conversion would ignore it and fit ellipsoids again";
+  EXPECT_EQ(expected.field.background, 7.0f);
+}
+
 TEST(ExpectedFrom, HasNoBricksWithoutAReference) {
   EXPECT_TRUE(expectedFrom(grids(), 3, {}).voxels->bricks.empty());
 }
