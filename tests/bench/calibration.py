@@ -6,14 +6,13 @@
 
 `measure` converts each smoke in several ways, lets Cycles draw the source and all results at three densities, and writes
 the differences of the pictures and of the volumes to OUT/calibration.json, and the pictures to OUT/cycles_SMOKE.png.
-Smokes that the file has are not measured again. FOLDER of --bin is a build folder with the Python module. Blender 3.4 or newer is needed, SPERR 0.8.5, python3-numpy
-and python3-matplotlib. `page` makes docs/figures/calibration.md and its picture from that file.
+Smokes that the file has are not measured again. FOLDER of --bin is a build folder with the Python module; Blender 3.4,
+SPERR 0.8.5, python3-numpy and python3-matplotlib are needed. `page` makes docs/figures/calibration.md and its chart.
 """
 import argparse
 import json
 import math
 import pathlib
-import subprocess
 import sys
 
 import numpy as np
@@ -92,8 +91,8 @@ renderer.
   counts, and values below 0 are 0.
 - **Pictures.** Cycles of Blender 3.4 draws the source and all results in {side} x {side} pixels at three densities, for which
   the median column lets T = 0.9, 0.5 or 0.1 of the light through, with sun and material of
-  `tests/blender/render_pictures.py`. The smoke fills the picture, which is exposed such that the brightest pixel of the
-  source is white. Light is scattered once, as Blender does by default.
+  `tests/blender/render_pictures.py`. The picture shows the bounds of all voxels that are not 0, and is exposed such that the brightest
+  pixel of the source is white. Light is scattered once, as Blender does by default.
 - **Differences of pictures.** PSNR is that of linear light. FLIP is the mean of LDR-FLIP (Andersson et al. 2020) of the
   sRGB values, 67 pixels a degree; as -20 log10, a tenth of it is 20 dB.
 - **Noise.** Each picture is drawn with two seeds. The squared error is the mean product of the differences of the one seed
