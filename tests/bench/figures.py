@@ -99,6 +99,7 @@ class Bench:
         grid = report["grids"][0]
         return file, {"bytes": report["output"]["bytes"], "ellipsoids": grid["ellipsoids"],
                       "psnr_box": grid["metrics"]["psnr_box"], "psnr_active": grid["metrics"]["psnr_active"],
+                      "psnr_t50": (grid["quality"] or {}).get("psnr_t50"),
                       "max_error": grid["metrics"]["max_error"], "stored": grid["representation"]["stored"],
                       "fit_s": grid["seconds"]["optimise"], "process_s": time.monotonic() - begin}
 
@@ -117,12 +118,14 @@ def formats(bench):
                 continue
 
             def measured(name=name, source=source, part=part, size=size):
-                file, row = bench.fit(name, "--size", size, allowed=(0, 2, 3, 4))
-                rows = [{"row": "ESVR", **row}]
+                rows = []
+                for title, measure in {"ESVR": "auto", "ESVR, --measure values": "values"}.items():
+                    file, row = bench.fit(name, "--size", size, "--measure", measure, allowed=(0, 2, 3, 4))
+                    rows.append({"row": title, **row})
                 words = [source[0], *([file] if file else []), *source[1:], *([] if file else ["--size", size])]
                 table = bench.report("esvr-compare", "table", *words, "--rows", "matched,zfp", "--max-dense", "1GB",
                                      "--runs", 1, *bench.rivals())
-                keys = ("bytes", "psnr_box", "psnr_active", "max_error", "iou", "encode_s", "decode_s")
+                keys = ("bytes", "psnr_box", "psnr_active", "psnr_t50", "max_error", "iou", "encode_s", "decode_s")
                 rows += [{"row": r["name"], **{k: r[k] for k in keys if k in r}} for r in table["rows"]
                          if (r.get("bytes") or math.inf) <= 1.02 * size and r["group"] != "ESVR"]
                 return [{"volume": name, "part": f"1/{part}", "size": size, **r} for r in rows]

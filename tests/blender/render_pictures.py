@@ -36,8 +36,8 @@ def set_up_cycles(scene):
     scene.world.color = (0.0, 0.0, 0.0)
 
 
-def set_up_picture(scene):
-    scene.render.resolution_x = scene.render.resolution_y = SIDE
+def set_up_picture(scene, side=SIDE):
+    scene.render.resolution_x = scene.render.resolution_y = side
     scene.render.resolution_percentage = 100
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"

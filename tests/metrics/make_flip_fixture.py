@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
-"""Prints the FLIP values that flip_test.cpp compares with, from the paper's equations.
+"""FLIP from the paper's equations. As a program, it prints the values that flip_test.cpp compares with.
 
-Needs numpy and scipy (Debian: python3-scipy; the values in the test are from scipy 1.10.1). The
-equations are those of Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020.
-Every filter is the two-dimensional kernel of the paper; the library uses products of one-dimensional
-ones instead. Colors are converted by numpy's matrix inverse.
+Needs numpy. The equations are those of Andersson et al., "FLIP: A Difference Evaluator for
+Alternating Images", 2020. Every filter is the two-dimensional kernel of the paper; the library uses
+products of one-dimensional ones instead. Colors are converted by numpy's matrix inverse.
+tests/bench/calibration.py compares pictures of Cycles with it.
 """
 import numpy as np
-from scipy.ndimage import correlate
 
 WIDTH, HEIGHT, BLOCK = 40, 28, 4
 XYZ = np.array([[10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
@@ -79,20 +78,27 @@ def feature_kernel(ppd, point):
     return np.where(k < 0, k / -k[k < 0].sum(), k / k[k > 0].sum())
 
 
+def correlate(plane, kernel):
+    """The sum over a kernel around each pixel. The picture goes on as at its border."""
+    sides = [(n // 2, n // 2) for n in kernel.shape]
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(plane, sides, mode='edge'), kernel.shape)
+    return np.einsum('yxij,ij->yx', windows, kernel)
+
+
 def seen(picture, ppd):
     terms = ([(1, 0.0047)], [(1, 0.0053)], [(34.1, 0.04), (13.5, 0.025)])
-    planes = [correlate(picture[..., c], eye_kernel(ppd, terms[c]), mode='nearest')
-              for c in range(3)]
+    planes = [correlate(picture[..., c], eye_kernel(ppd, terms[c])) for c in range(3)]
     return hunt_lab(np.clip(linear_rgb(np.stack(planes, -1)), 0, 1))
 
 
 def features(picture, ppd, point):
     kernel = feature_kernel(ppd, point)
     y = (picture[..., 0] + 16) / 116
-    return np.hypot(correlate(y, kernel, mode='nearest'), correlate(y, kernel.T, mode='nearest'))
+    return np.hypot(correlate(y, kernel), correlate(y, kernel.T))
 
 
 def flip(a, b, ppd):
+    """The difference of each pixel of two sRGB pictures, 0 to 1, with `ppd` pixels per degree."""
     a, b = ycxcz(a), ycxcz(b)
     largest = hyab(hunt_lab(np.array([0., 1, 0])), hunt_lab(np.array([0., 0, 1]))) ** 0.7
     d = hyab(seen(a, ppd), seen(b, ppd)) ** 0.7
