@@ -158,6 +158,21 @@ TEST_F(CarriedFile, SaysWhichGridsNanoVdbAndPartsCannotHold) {
   }
 }
 
+TEST_F(CarriedFile, WithAHalfGridIsWrittenWithAWarningForOlderVersionsOfOpenVdb) {
+  const std::string source = ESVR_SOURCE_DIR "/tests/vdb/openvdb13/half_mask.vdb";
+  for (const bool keeps : {true, false}) {
+    const auto fitted = keeps ? test::quickFit(source, out(), {"--keep", "density", "-f"})
+                              : test::quickFit(source, out(), {"-f"});
+    ASSERT_EQ(fitted.exitCode, 0) << fitted.err;
+    const auto run = test::esvr2vdb({out(), back(), "-f"});
+    EXPECT_EQ(run.exitCode, 0);
+    EXPECT_THAT(run.err, keeps ? testing::Matcher<std::string>(
+                                     HasSubstr("\"density\" is a HalfGrid; only OpenVDB 13"))
+                               : testing::Matcher<std::string>(""));
+    EXPECT_EQ(inspectVdb(back()).grids.front().activeVoxels, 2261u);
+  }
+}
+
 TEST_F(CarriedFile, WithDamagedBytesIsRefused) {
   convert();
   std::string bytes = test::readText(out());

@@ -1,7 +1,7 @@
 // Plan: what is written is read back. The files for other programs are held against what these programs read:
 //
 // - The prim of a USD file has the properties of the schema ParticleField3DGaussianSplat with their types, and none
-//   besides (pxr/usd/usdVol/schema.usda and usdGeom/schema.usda of OpenUSD 26.03). Arrays have one element a splat.
+//   besides (pxr/usd/usdVol/schema.usda and usdGeom/schema.usda of OpenUSD 26.05). Arrays have one element a splat.
 //   Numbers mean what the schema says: opacities and scales are linear, a quaternion begins with its real part, a
 //   color is its coefficient of degree 0 times the constant harmonic, plus a half.
 // - A PLY file for Mitsuba 3 is read by the steps of its reader (src/shapes/ellipsoids.h and ply.h of Mitsuba 3.9.1),
