@@ -352,6 +352,16 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
               std::to_string(items) + " items");
 }
 
+/// Warns of carried grids with which older versions of OpenVDB open no grid of the file.
+void tellHalfGrids(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
+                   const Options& options, const cli::Log& log) {
+  if (writesNano(options)) return;
+  for (const auto& [grid, name, place] : chosen)
+    if (grid.isCarried && file.carried[grid.index].treeType.starts_with("Tree_half_"))
+      log.warning("grid \"" + shownName(name) +
+                  "\" is a HalfGrid; only OpenVDB 13 and newer open a file with one");
+}
+
 /// The range of the active values of a grid of the reference.
 std::optional<std::array<float, 2>> rangeIn(const Options& options, const VdbSummary& file,
                                             std::size_t place) {
@@ -424,6 +434,7 @@ void convertContent(const Options& options, const EsvrFile& file, const CancelTo
   const auto grids = decodeAll(file, chosen, options, log);
   if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
+  tellHalfGrids(file, chosen, options, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
   if (options.reference) printErrors(options, compared, out);
   watched.requireUnchanged();  // the errors are those of one file

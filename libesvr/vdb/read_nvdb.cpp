@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <type_traits>
@@ -20,7 +21,8 @@
 // offset is checked before it is followed.
 //
 // In the layout of NanoVDB's major version 32, a file consists of segments: each has a header of 16 bytes,
-// then 176 bytes and a name for each grid, and then the buffer of each grid, compressed as the header says.
+// then 176 bytes and a name for each grid, and then the buffer of each grid, compressed as the header says. A file
+// may also consist of buffers alone ("raw" files, as GridHandle::write makes them).
 
 namespace esvr::vdb {
 namespace {
@@ -28,7 +30,7 @@ namespace {
 // The directory
 
 constexpr std::uint64_t kMagicOld =
-    0x304244566f6e614eu;  // "NanoVDB0": a file, and before 32.6 also a grid
+    0x304244566f6e614eu;  // "NanoVDB0": a file, and before 32.6 also a buffer
 constexpr std::uint64_t kMagicGrid = 0x314244566f6e614eu;  // "NanoVDB1"
 constexpr std::uint64_t kMagicFile = 0x324244566f6e614eu;  // "NanoVDB2"
 
@@ -72,28 +74,80 @@ struct NanoEntry {
 /// OpenVDB's name for the value type of a NanoVDB grid ("float"), or NanoVDB's own name if OpenVDB
 /// has none ("fp8").
 std::string nanoValueType(std::uint32_t gridType) {
-  constexpr std::array kNames{"unknown", "float", "double", "int16",  "int32", "int64", "vec3s",
-                              "vec3d",   "mask",  "half",   "uint32", "bool",  "rgba8", "fp4",
-                              "fp8",     "fp16",  "fpn",    "vec4s",  "vec4d", "index"};
+  constexpr std::array kNames{
+      "unknown",   "float",       "double",     "int16",  "int32",   "int64", "vec3s",
+      "vec3d",     "mask",        "half",       "uint32", "bool",    "rgba8", "fp4",
+      "fp8",       "fp16",        "fpn",        "vec4s",  "vec4d",   "index", "onindex",
+      "indexmask", "onindexmask", "pointindex", "vec3u8", "vec3u16", "uint8"};
   return gridType < kNames.size() ? kNames[gridType] : "number " + std::to_string(gridType);
+}
+
+bool hasReadMajor(std::uint32_t version) { return version >> 21 == NANOVDB_MAJOR_VERSION_NUMBER; }
+
+/// \throws BadInput  the version has another layout
+void requireVersion(std::uint32_t version) {
+  if (hasReadMajor(version)) return;
+  // The version in full, because the first ones have the major version 0: "0.0.28".
+  constexpr std::uint32_t kMinorMask = (1u << 11) - 1, kPatchMask = (1u << 10) - 1;
+  throw BadInput("was written by NanoVDB " + std::to_string(version >> 21) + '.' +
+                 std::to_string((version >> 10) & kMinorMask) + '.' +
+                 std::to_string(version & kPatchMask) + ", this program reads version " +
+                 std::to_string(NANOVDB_MAJOR_VERSION_NUMBER));
+}
+
+/// True if a buffer follows instead of a segment. Before 32.6, both began with the same number, and the words
+/// where one of them has its version decide.
+bool bufferFollows(InputFile& file) {
+  struct Words {
+    std::uint64_t magic;
+    std::uint32_t versionOfSegment, other, versionOfBuffer;
+  };
+  const std::uint64_t at = file.position();
+  if (file.remaining() < sizeof(Words)) return false;
+  const auto words = file.read<Words>();
+  file.seek(at);
+  return words.magic == kMagicGrid ||
+         (words.magic == kMagicOld && !hasReadMajor(words.versionOfSegment) &&
+          hasReadMajor(words.versionOfBuffer));
+}
+
+/// Reads what a directory would say about a buffer from the buffer itself.
+/// \throws BadInput  the buffer has another version or is cut
+NanoEntry readBuffer(InputFile& file) {
+  struct Tree {
+    std::int64_t nodesAt[4];  ///< from here to the first leaf, lower node, upper node and root
+    std::uint32_t nodeCount[3], tileCount[3];
+    std::uint64_t activeVoxels;
+  };
+  static_assert(sizeof(Tree) == 64 && sizeof(nanovdb::GridData) == 672);
+  NanoEntry entry;
+  entry.at = file.position();
+  const auto grid = file.read<nanovdb::GridData>();
+  requireVersion(grid.mVersion.id());
+  const std::uint64_t treeAt = file.position();
+  const auto tree = file.read<Tree>();
+  const std::uint64_t headBytes = file.position() - entry.at;
+  if (grid.mGridSize < headBytes || grid.mGridSize - headBytes > file.remaining())
+    throw BadInput("is damaged: a grid of an impossible size");
+  entry.gridBytes = entry.storedBytes = grid.mGridSize;
+  const InputFile::Within buffer(file, entry.at + grid.mGridSize);
+  entry.name.assign(grid.mGridName, strnlen(grid.mGridName, sizeof grid.mGridName));
+  entry.gridType = std::uint32_t(grid.mGridType);
+  entry.gridClass = std::uint32_t(grid.mGridClass);
+  entry.activeVoxels = tree.activeVoxels;
+  if (tree.activeVoxels > 0) {
+    file.seek(treeAt + std::uint64_t(tree.nodesAt[3]));
+    entry.activeBox = file.read<Box>();  // the first member of a root
+  }
+  return entry;
 }
 
 /// \throws BadInput  there is no header, or it is of another version
 SegmentHeader readSegmentHeader(InputFile& file) {
   const auto header = file.read<SegmentHeader>();
-  if (header.magic == kMagicGrid)
-    throw BadInput("is a bare NanoVDB grid without a file header: write it with nanovdb::io");
   if (header.magic != kMagicOld && header.magic != kMagicFile)
     throw BadInput("is damaged: no NanoVDB header where one should be");
-  const std::uint32_t version = header.version, major = version >> 21;
-  if (major != NANOVDB_MAJOR_VERSION_NUMBER) {
-    // The version in full, because the first ones have the major version 0: "0.0.28".
-    constexpr std::uint32_t kMinorMask = (1u << 11) - 1, kPatchMask = (1u << 10) - 1;
-    throw BadInput("was written by NanoVDB " + std::to_string(major) + '.' +
-                   std::to_string((version >> 10) & kMinorMask) + '.' +
-                   std::to_string(version & kPatchMask) + ", this program reads version " +
-                   std::to_string(NANOVDB_MAJOR_VERSION_NUMBER));
-  }
+  requireVersion(header.version);
   return header;
 }
 
@@ -113,11 +167,17 @@ NanoEntry readEntry(InputFile& file, std::uint16_t codec) {
   return entry;
 }
 
-/// \throws BadInput  the file has another version, is a grid buffer without a header, or is damaged
+/// \throws BadInput  the file has another version, or is damaged
 std::vector<NanoEntry> readNanoDirectory(InputFile& file) {
   std::vector<NanoEntry> entries;
   file.seek(0);
   while (file.remaining() > 0) {
+    if (bufferFollows(file)) {
+      entries.push_back(readBuffer(file));
+      file.seek(entries.back().at);
+      file.skip(entries.back().storedBytes);
+      continue;
+    }
     const auto header = readSegmentHeader(file);
     const std::size_t first = entries.size();
     for (int i = 0; i < header.gridCount; ++i) entries.push_back(readEntry(file, header.codec));

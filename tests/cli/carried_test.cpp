@@ -158,6 +158,21 @@ TEST_F(CarriedFile, SaysWhichGridsNanoVdbAndPartsCannotHold) {
   }
 }
 
+TEST_F(CarriedFile, WithAHalfGridIsWrittenWithAWarningForOlderVersionsOfOpenVdb) {
+  const std::string source = ESVR_SOURCE_DIR "/tests/vdb/openvdb13/half_mask.vdb";
+  const auto warningOf = [&](std::vector<std::string> options) {
+    options.insert(options.begin(), {source, out(), "-f"});
+    EXPECT_EQ(test::vdb2esvr(options).exitCode, 0);
+    const auto run = test::esvr2vdb({out(), back(), "-f"});
+    EXPECT_EQ(run.exitCode, 0);
+    EXPECT_EQ(inspectVdb(back()).grids.front().activeVoxels, 2261u);
+    return run.err;
+  };
+  EXPECT_THAT(warningOf({"--keep", "density"}),
+              HasSubstr("\"density\" is a HalfGrid; only OpenVDB 13"));
+  EXPECT_EQ(warningOf({"--lossless"}), "");
+}
+
 TEST_F(CarriedFile, WithDamagedBytesIsRefused) {
   convert();
   std::string bytes = test::readText(out());

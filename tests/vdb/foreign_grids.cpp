@@ -5,6 +5,8 @@
 
 #include ESVR_NANOVDB_CREATE
 
+#include <fstream>
+
 namespace esvr::test {
 namespace {
 
@@ -28,6 +30,15 @@ vdb::NanoHandle vectors(const openvdb::Vec3SGrid& grid) {
 #endif
 }
 
+std::vector<vdb::NanoHandle> handlesOf(const std::vector<OpenVdbGrid>& grids) {
+  std::vector<vdb::NanoHandle> handles;
+  for (const auto& grid : grids) {
+    const auto wind = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
+    handles.push_back(wind ? vectors(*wind) : vdb::makeNano(*grid));
+  }
+  return handles;
+}
+
 }  // namespace
 
 OpenVdbGrid emptyGrid(const std::string& treeType, const std::string& name) {
@@ -39,12 +50,15 @@ OpenVdbGrid emptyGrid(const std::string& treeType, const std::string& name) {
 
 void saveNano(const std::filesystem::path& path, const std::vector<OpenVdbGrid>& grids,
               NanoCodec codec) {
-  std::vector<vdb::NanoHandle> handles;
-  for (const auto& grid : grids) {
-    const auto wind = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid);
-    handles.push_back(wind ? vectors(*wind) : vdb::makeNano(*grid));
+  nanovdb::io::writeGrids(path.string(), handlesOf(grids), codecOf(codec));
+}
+
+void saveNanoBuffers(const std::filesystem::path& path, const std::vector<OpenVdbGrid>& grids) {
+  std::ofstream file(path, std::ios::binary);
+  for (const auto& handle : handlesOf(grids)) {
+    const void* bytes = handle.buffer().data();
+    file.write(static_cast<const char*>(bytes), std::streamsize(handle.buffer().size()));
   }
-  nanovdb::io::writeGrids(path.string(), handles, codecOf(codec));
 }
 
 void saveNanoAs(const std::filesystem::path& path, const openvdb::GridBase& grid,

@@ -40,6 +40,8 @@ enum class NanoCodec { kNone, kZip, kBlosc };
 /// Writes grids of floats, doubles or vectors of three floats.
 void saveNano(const std::filesystem::path& path, const std::vector<OpenVdbGrid>& grids,
               NanoCodec codec = NanoCodec::kNone);
+/// The same without a directory: the buffers of the grids, one after the other.
+void saveNanoBuffers(const std::filesystem::path& path, const std::vector<OpenVdbGrid>& grids);
 /// Writes a grid of floats in one of NanoVDB's value types.
 void saveNanoAs(const std::filesystem::path& path, const openvdb::GridBase& grid,
                 NanoValues values);

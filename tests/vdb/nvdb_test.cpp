@@ -1,4 +1,4 @@
-/// Plan: files of NanoVDB's own writer, with every codec and float type, are read exactly. Files
+/// Plan: files of NanoVDB's own writer, with every codec and float type and without a directory, are read exactly. Files
 /// written by the library are read by NanoVDB's own reader. Files that are cut, damaged or
 /// inconsistent are refused.
 
@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <span>
+#include <string_view>
 
 #include "esvr/error.h"
 #include "support/trials.h"
@@ -318,9 +319,72 @@ TEST_F(Nvdb, WithTheMagicNumberOfNewerFilesIsRead) {
   bytes[7] = std::byte{'2'};
   test::writeBytes(path(), bytes);
   EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
-  bytes[7] = std::byte{'1'};
-  test::writeBytes(path(), bytes);
-  EXPECT_THAT([&] { (void)inspectVdb(path()); }, ThrowsMessage<BadInput>(HasSubstr("bare")));
+}
+
+/// Buffers begin with another number since NanoVDB 32.6.
+Bytes asNewBuffers(Bytes bytes) {
+  constexpr std::string_view kOld = "NanoVDB0";
+  const auto isOld = [&](std::size_t at) {
+    return std::memcmp(bytes.data() + at, kOld.data(), kOld.size()) == 0;
+  };
+  for (std::size_t at = 0; at + kOld.size() <= bytes.size(); at += 32)  // the alignment of nodes
+    if (isOld(at)) bytes[at + 7] = std::byte{'1'};
+  return bytes;
+}
+
+TEST_F(Nvdb, OfBuffersWithoutADirectoryReadsAsItsSource) {
+  const openvdb::GridPtrVec sources{sourceGrid(), sourceOfVectors()};
+  test::save(directory_ / "in.vdb", sources);
+  const auto expected = readGrid(directory_ / "in.vdb", "density");
+  save(sources);
+  const auto listed = inspectVdb(path()).grids;
+  test::saveNanoBuffers(path(), sources);
+  const Bytes old = test::bytesOf(path());
+  for (const Bytes& bytes : {old, asNewBuffers(old)}) {
+    test::writeBytes(path(), bytes);
+    const auto found = inspectVdb(path()).grids;
+    ASSERT_EQ(found.size(), listed.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      EXPECT_EQ(found[i].name, listed[i].name);
+      EXPECT_EQ(found[i].valueType, listed[i].valueType);
+      EXPECT_EQ(found[i].gridClass, listed[i].gridClass);
+      EXPECT_EQ(found[i].activeVoxels, listed[i].activeVoxels);
+      EXPECT_EQ(found[i].activeBox, listed[i].activeBox);
+      EXPECT_EQ(found[i].storedBytes, listed[i].storedBytes);
+    }
+    test::expectSameBits(readGrid(path(), "density").volume, expected.volume);
+    expectSameVectors(readVector(path(), "vel"), readVector(directory_ / "in.vdb", "vel"));
+  }
+}
+
+TEST_F(Nvdb, OfBuffersThatAreCutOrDamagedIsRefusedOrRead) {
+  test::saveNanoBuffers(path(), {test::smallGrid(), test::smallGrid()});
+  const Bytes both = asNewBuffers(test::bytesOf(path()));
+  const auto begin = [&](std::size_t size) {
+    return Bytes(both.begin(), both.begin() + std::ptrdiff_t(size));
+  };
+  ASSERT_TRUE(readable(both));
+  for (std::size_t size = 0; size < both.size(); size += 1 + both.size() / 20)
+    EXPECT_FALSE(readable(begin(size))) << size;
+  const Bytes whole = begin(both.size() / 2);  // the first grid
+  ASSERT_TRUE(readable(whole));
+  constexpr std::size_t kSizeAt = 32, kRootAt = 672 + 24;  // the heads of a grid and of its tree
+  const auto readableWith = [&](std::size_t at, std::uint64_t value) {
+    Bytes damaged = whole;
+    std::memcpy(damaged.data() + at, &value, sizeof value);
+    return readable(damaged);
+  };
+  for (const std::uint64_t value :
+       {std::uint64_t{700}, std::uint64_t{1} << 40, std::numeric_limits<std::uint64_t>::max()}) {
+    EXPECT_FALSE(readableWith(kSizeAt, value)) << value;
+    EXPECT_FALSE(readableWith(kRootAt, value)) << value;
+  }
+  EXPECT_FALSE(readableWith(kSizeAt, 0));
+  for (std::size_t i = 0; i < 800; i += test::stride(7)) {
+    Bytes damaged = whole;
+    damaged[i] ^= std::byte{0x80};
+    (void)readable(damaged);
+  }
 }
 
 TEST(VdbVersions, NamesBothLibraries) {
