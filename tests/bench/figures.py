@@ -196,7 +196,7 @@ def resolution(bench):
 
 
 def sequences(bench):
-    """A file for each frame against one file of all frames (docs/sequences.md)."""
+    """A file for each frame against one file of all frames (docs/scale.md)."""
     for folder, pattern in {"sequence": "gas_####", "fire": "fluid_data_####"}.items():
         for way, out in {"files": "frame.####.esvr", "one file": "all.esvr"}.items():
             def measured(folder=folder, pattern=pattern, way=way, out=out):
