@@ -61,12 +61,6 @@ class SequenceFiles : public test::FolderTest {
     return test::quickFit(at("in.####.vdb"), at("out.####.esvr"), more);
   }
   [[nodiscard]] bool isThere(const std::string& name) const { return fs::exists(at(name)); }
-  /// The names of files and folders whose names begin with "out".
-  [[nodiscard]] Words outputs() const {
-    Words names = folder_.names();
-    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
-    return names;
-  }
 };
 
 TEST_F(SequenceFiles, haveTheBytesOfSingleFilesOnAnyNumberOfThreads) {

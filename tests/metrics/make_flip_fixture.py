@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Prints the FLIP values that flip_test.cpp compares with, from the paper's equations.
+"""Prints the FLIP values that image_metrics_test.cpp compares with, from the paper's equations.
 
 Needs numpy and scipy (Debian: python3-scipy; the values in the test are from scipy 1.10.1). The
 equations are those of Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", 2020.

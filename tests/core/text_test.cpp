@@ -1,14 +1,45 @@
-// Plan: words that people mistype find what they mean: a letter too many, too few, wrong or swapped,
-// capitals, underscores, or the begin of a word. Words that mean something else find nothing.
+// Plan: the tests parse whole texts as numbers, integers, a number at the start of a text, and lists. Words that people
+// mistype find what they mean: a letter too many, too few, wrong or swapped, capitals, underscores, or the begin of a word.
+// Words that mean something else find nothing.
 
-#include "esvr/did_you_mean.h"
-
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <vector>
 
+#include "core/parse_text.h"
+#include "esvr/did_you_mean.h"
+
 namespace esvr {
 namespace {
+
+using testing::ElementsAre;
+
+TEST(ParseText, ReadsFiniteNumbersThatTakeTheWholeText) {
+  EXPECT_EQ(parseNumber("-2.5e-1"), -0.25);
+  EXPECT_EQ(parseNumber("3"), 3.0);
+  for (const char* text : {"", " 1", "1 ", "x", "1x", "nan", "inf", "1e999", "0x10"})
+    EXPECT_FALSE(parseNumber(text)) << text;
+}
+
+TEST(ParseText, ReadsWholeNumbers) {
+  EXPECT_EQ(parseWhole("-12"), -12);
+  for (const char* text : {"", "1.5", "1e3", "99999999999999999999"})
+    EXPECT_FALSE(parseWhole(text)) << text;
+}
+
+TEST(ParseText, TellsTheNumberFromItsUnit) {
+  const auto number = parseLeadingNumber("2.5MB");
+  ASSERT_TRUE(number);
+  EXPECT_EQ(number->value, 2.5);
+  EXPECT_EQ(number->rest, "MB");
+  EXPECT_FALSE(parseLeadingNumber("MB"));
+}
+
+TEST(ParseText, SplitsAtEverySeparator) {
+  EXPECT_THAT(splitText("a,b,,c", ','), ElementsAre("a", "b", "", "c"));
+  EXPECT_THAT(splitText("", ','), ElementsAre(""));
+}
 
 using Words = std::vector<std::string>;
 
