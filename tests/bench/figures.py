@@ -228,7 +228,7 @@ def sharing(bench):
 
 
 def chunks(bench):
-    """Fits in chunks against one fit of the whole volume, with a count that grows with the volume (docs/scale.md)."""
+    """Fits in chunks against one fit of the whole volume, with a count that grows with the volume (docs/figures/scale.md)."""
     for side in (256, 512, 1024):
         for voxels in (None, 50_000, 200_000):
             def measured(side=side, voxels=voxels):
