@@ -13,7 +13,6 @@
 
 #include "compare/compare_files.h"
 #include "compare/grid_file.h"
-#include "compare/judge.h"
 #include "compare/options.h"
 #include "esvr/error.h"
 #include "programs/command_line.h"

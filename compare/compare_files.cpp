@@ -10,7 +10,7 @@
 #include <span>
 #include <utility>
 
-#include "compare/judge.h"
+#include "compare/check.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/metrics.h"

@@ -1,7 +1,7 @@
 // The command `curves`: its options, the rows that it makes, their points and charts, and the
 // files.
 
-#include "compare/curves.h"
+#include "compare/table.h"
 
 #include <algorithm>
 #include <cmath>

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "compare/grid_file.h"
+#include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "programs/messages.h"
@@ -291,17 +292,6 @@ void writeRaw(const std::filesystem::path& path, const std::vector<float>& array
   stream.write(reinterpret_cast<const char*>(array.data()),
                std::streamsize(array.size() * sizeof(float)));
   if (!stream.flush()) throw RuntimeFailure(path.string() + ": cannot be written");
-}
-
-/// Half of the smallest difference between an active voxel and the background.
-float activityThreshold(const SparseVolume& volume) {
-  float smallest = std::numeric_limits<float>::infinity();
-  for (std::size_t b = 0; b < volume.brickCount(); ++b)
-    for (int i = 0; i < kBrickVoxels; ++i) {
-      const float difference = std::abs(volume.brickValues(b)[i] - volume.background);
-      if (volume.active[b].test(i) && difference > 0.0f) smallest = std::min(smallest, difference);
-    }
-  return std::isfinite(smallest) ? smallest / 2 : 0.0f;
 }
 
 /// Makes voxels inactive that differ from the background by no more than a threshold; they keep

@@ -1,4 +1,4 @@
-#include "compare/judge.h"
+#include "compare/check.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "compare/check.h"
-#include "compare/curves.h"
 #include "compare/options.h"
 #include "compare/table.h"
 #include "esvr/did_you_mean.h"

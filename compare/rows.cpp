@@ -124,7 +124,8 @@ const char* nameOf(PackedCodec codec) {
   return " raw";
 }
 
-/// The name of a row: "NanoVDB FpN Zip", "ZFP accuracy".
+}  // namespace
+
 std::string displayName(const BaselineSetting& setting) {
   if (const auto* packing = std::get_if<VoxelPacking>(&setting.how))
     return std::string(nameOf(packing->form)) + nameOf(packing->codec);
@@ -132,6 +133,8 @@ std::string displayName(const BaselineSetting& setting) {
   const std::string name = zfp.mode == ZfpMode::kAccuracy ? "ZFP accuracy" : "ZFP precision";
   return zfp.bricks ? name + " of bricks" : name;
 }
+
+namespace {
 
 constexpr PackedCodec kNone = PackedCodec::kNone, kZip = PackedCodec::kZip,
                       kBlosc = PackedCodec::kBlosc;

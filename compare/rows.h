@@ -95,6 +95,9 @@ struct FitWish {
   bool paper = false;                    ///< whether the paper's method is used, stored as float32
 };
 
+/// The name of a row: "NanoVDB FpN Zip", "ZFP accuracy".
+[[nodiscard]] std::string displayName(const BaselineSetting& setting);
+
 /// Makes one row after the other.
 class RowMaker {
  public:

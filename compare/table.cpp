@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "compare/rows.h"
-#include "compare/table_report.h"
+#include "compare/table_record.h"
 #include "esvr/error.h"
 #include "programs/command_line.h"
 #include "programs/files.h"

@@ -1,7 +1,8 @@
 #pragma once
-/// The data of a table.
+/// The data of a table, and its reports.
 
 #include <cstdint>
+#include <iosfwd>
 #include <optional>
 #include <string>
 #include <vector>
@@ -78,5 +79,16 @@ struct TableRecord {
   std::string drawnOn{};                        ///< name of the device that draws
   bool interrupted = false;
 };
+
+struct TableOptions;
+
+// The rows as text, Markdown, CSV, JSON and HTML (table_report.cpp).
+
+/// Prints the table with at most 100 characters in a line, unless a name is longer.
+/// \param search  whether the trials of the searches are printed
+void printTable(const TableRecord& record, bool search, std::ostream& out);
+
+/// Writes all wanted files. \throws RuntimeFailure  a file is not writable
+void writeReports(const TableOptions& options, const TableRecord& record);
 
 }  // namespace esvr::compare

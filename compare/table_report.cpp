@@ -1,6 +1,6 @@
 // The forms of a table: text, Markdown, JSON, CSV and a page.
 
-#include "compare/table_report.h"
+#include "compare/table_record.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +11,7 @@
 #include "compare/finding.h"
 #include "compare/options.h"
 #include "compare/report_parts.h"
+#include "compare/table.h"
 #include "programs/data_table.h"
 #include "programs/files.h"
 #include "programs/messages.h"

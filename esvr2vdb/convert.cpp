@@ -23,8 +23,6 @@
 #include "esvr/metrics.h"
 #include "esvr/resolution.h"
 #include "esvr/vdb_io.h"
-#include "esvr2vdb/resolution.h"
-#include "esvr2vdb/splats.h"
 #include "programs/files.h"
 #include "programs/messages.h"
 #include "programs/names.h"

@@ -2,11 +2,16 @@
 #include "esvr2vdb/jobs.h"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "esvr/container.h"
@@ -15,7 +20,6 @@
 #include "esvr/sequence_file.h"
 #include "esvr/splats.h"
 #include "esvr/vdb_io.h"
-#include "esvr2vdb/list_notes.h"
 #include "programs/messages.h"
 #include "programs/names.h"
 #include "programs/sequence.h"
@@ -25,6 +29,95 @@ namespace esvr::esvr2vdb {
 namespace {
 
 namespace fs = std::filesystem;
+
+// What metadata says: who made a file, how fast its frames play, and what its numbers measure.
+
+/// Names of frame rates without capitals and signs: "fps", "FrameRate", "frames_per_second".
+constexpr std::array kFrameRates{"fps", "framerate", "framespersecond", "timecodespersecond"};
+/// A longer text is cut, because a file may have any.
+constexpr std::size_t kMostLetters = 80;
+
+bool isLetter(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0; }
+bool isCapital(char c) { return std::isupper(static_cast<unsigned char>(c)) != 0; }
+char lowered(char c) { return char(std::tolower(static_cast<unsigned char>(c))); }
+
+/// The words of a name without capitals: "length_unit" and "lengthUnit" are "length" and "unit".
+std::vector<std::string> wordsOf(std::string_view name) {
+  std::vector<std::string> words{""};
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const bool begins = i > 0 && isCapital(name[i]) && !isCapital(name[i - 1]);
+    if ((begins || !isLetter(name[i])) && !words.back().empty()) words.emplace_back();
+    if (isLetter(name[i])) words.back() += lowered(name[i]);
+  }
+  return words;
+}
+
+bool isLookedFor(std::string_view name) {
+  const std::vector<std::string> words = wordsOf(name);
+  std::string joined;
+  for (const std::string& word : words) joined += word;
+  return joined == "creator" || std::ranges::count(kFrameRates, joined) > 0 ||
+         std::ranges::count(words, "unit") + std::ranges::count(words, "units") > 0;
+}
+
+template <class T>
+std::optional<std::string> numberIn(const MetaItem& item) {
+  T value{};
+  if (item.value.size() != sizeof value) return std::nullopt;
+  std::memcpy(&value, item.value.data(), sizeof value);
+  if constexpr (std::is_integral_v<T>) return std::to_string(value);
+  return cli::shortNumber(double(value));
+}
+
+/// The value of an item that is a text or a number; nothing for others.
+std::optional<std::string> valueOf(const MetaItem& item) {
+  if (item.type == "float") return numberIn<float>(item);
+  if (item.type == "double") return numberIn<double>(item);
+  if (item.type == "int32") return numberIn<std::int32_t>(item);
+  if (item.type == "int64") return numberIn<std::int64_t>(item);
+  if (item.type != "string" || item.value.empty()) return std::nullopt;
+  const std::string_view text(reinterpret_cast<const char*>(item.value.data()), item.value.size());
+  const bool isLong = text.size() > kMostLetters;
+  return std::string(text.substr(0, kMostLetters)) + (isLong ? "..." : "");
+}
+
+/// The items that people look for, in the order of the file, as "creator Houdini 20.5, fps 24": the
+/// creator, the frame rate, and every item with the word "unit" or "units" in its name.
+std::string notesOf(std::span<const MetaItem> metadata) {
+  std::string notes;
+  for (const MetaItem& item : metadata)
+    if (const auto value = valueOf(item); value && isLookedFor(item.name))
+      notes += (notes.empty() ? "" : ", ") + item.name + ' ' + *value;
+  return notes;
+}
+
+/// Notes of the grids of a file. Grids of the same notes are named in one line.
+class GridNotes {
+ public:
+  void add(const std::string& grid, std::span<const MetaItem> metadata) {
+    const std::string text = notesOf(metadata);
+    if (text.empty()) return;
+    std::string& names = grids_[text];
+    if (names.empty()) texts_.push_back(text);
+    names += (names.empty() ? "" : ", ") + grid;
+  }
+
+  /// Prints a line for each text: "density, heat: length_unit mm".
+  void print() const {
+    for (const std::string& text : texts_)
+      std::cout << cli::printable(grids_.at(text) + ": " + text) << '\n';
+  }
+
+ private:
+  std::vector<std::string> texts_;            ///< the notes in the order in which they were added
+  std::map<std::string, std::string> grids_;  ///< names by text
+};
+
+/// Prints the notes of a file in a line, if there are any.
+void printFileNotes(std::span<const MetaItem> metadata) {
+  if (const std::string notes = notesOf(metadata); !notes.empty())
+    std::cout << cli::printable(notes) << '\n';
+}
 
 // A VDB file.
 
@@ -50,12 +143,12 @@ void listVdb(const Options& options) {
   const VdbSummary file = inspectVdb(options.input);
   std::cout << cli::printable(options.input.string()) << ": " << file.format << ", "
             << file.fileBytes << " bytes" << (file.grids.empty() ? ", no grid" : "") << '\n';
-  printFileNotes(file.metadata, std::cout);
+  printFileNotes(file.metadata);
   std::cout << '\n';
   printGrids(file);
   GridNotes notes;
   for (const GridSummary& grid : file.grids) notes.add(grid.uniqueName, grid.metadata);
-  notes.print(std::cout);
+  notes.print();
   if (options.verbosity != cli::Verbosity::kVerbose) return;
   std::cout << '\n';
   printDetails(file);
@@ -160,14 +253,14 @@ void listSequence(const Options& options) {
   std::cout << cli::printable(options.input.string()) << ": .esvr format " << summary.versionMajor
             << '.' << summary.versionMinor << ", " << summary.fileBytes << " bytes, "
             << reader.frames().size() << " frames in " << reader.groupCount() << " groups\n";
-  printFileNotes(first.metadata, std::cout);
+  printFileNotes(first.metadata);
   std::cout << '\n';
   cli::Table table({"frame", "group", "bytes", "refers to"});
   for (const SequenceFrame& frame : reader.frames()) table.add(rowOf(frame));
   table.print(std::cout);
   GridNotes notes;
   for (const ListedGrid& grid : listedGrids(first)) notes.add(grid.name, metadataOf(first, grid));
-  notes.print(std::cout);
+  notes.print();
 }
 
 // An .esvr file.
@@ -311,7 +404,7 @@ void printGrids(const Listing& listing) {
   table.print(std::cout);
   GridNotes notes;
   for (const ListedGrid& grid : listing.grids) notes.add(grid.name, metadataOf(listing.file, grid));
-  notes.print(std::cout);
+  notes.print();
 }
 
 /// The name of a section's grid; "-" if it belongs to the file.
@@ -439,7 +532,7 @@ void list(const Options& options) {
             << listing.summary.versionMajor << '.' << listing.summary.versionMinor << ", "
             << listing.summary.fileBytes << " bytes" << (listing.grids.empty() ? ", no grid" : "")
             << '\n';
-  printFileNotes(listing.file.metadata, std::cout);
+  printFileNotes(listing.file.metadata);
   std::cout << '\n';
   printGrids(listing);
   std::cout << '\n';

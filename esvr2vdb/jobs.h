@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,29 @@ struct Options {
 /// True if the whole file is wanted.
 [[nodiscard]] bool readsAll(const Options& options);
 
+/// True if the output is a file of splats.
+[[nodiscard]] bool writesSplats(const Options& options);
+
+// The resolution of the written grids (--coarsen, --voxel-size).
+
+/// True if grids may be written with other voxels than those of the source.
+[[nodiscard]] bool changesResolution(const Options& options);
+
+/// What `auto` becomes for these grids: the least factor of 1, 2, 4 and 8 with which all of them fit into the memory. Says
+/// so if it is above 1. Another wish is returned as it is.
+/// \param grids   components of vectors are grids of their own
+/// \throws MemoryExceeded  the coarsest grids do not fit either
+[[nodiscard]] Resolution resolved(const Resolution& wish, std::span<const StoredGrid* const> grids,
+                                  const DecodeOptions& decode, const cli::Log& log);
+
+/// The factor of the voxels of a grid. `auto` must be resolved.
+/// \throws UsageError  as for factorFor
+[[nodiscard]] double factorOf(const Resolution& wish, const GridDescriptor& grid);
+
+/// For --coarsen. \throws UsageError  the text is no factor
+[[nodiscard]] Resolution resolutionOf(const std::optional<std::string>& coarsen,
+                                      const std::optional<double>& voxelSize);
+
 // Jobs.
 
 /// Writes the VDB. If there is a reference, prints the errors of the written grids.
@@ -78,6 +102,14 @@ void convertContent(const Options& options, const EsvrFile& file, const CancelTo
 
 /// The limits with which the input is read.
 [[nodiscard]] ReadLimits limitsOf(const Options& options);
+
+/// Writes a grid of a file as splats.
+/// \throws BadInput  there is no such grid, or its ellipsoids cannot become splats (makeSplats)
+/// \throws UsageError  several grids are named
+void exportSplats(const Options& options, const EsvrFile& file, const cli::Log& log);
+
+/// Writes a VDB with the density and the colors of the splats in the input.
+void importSplats(const Options& options);
 
 /// Writes a VDB for each frame of the sequence, on several threads.
 /// \throws Error  the kind of the first frame that failed; RuntimeFailure if the run was

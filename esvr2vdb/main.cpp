@@ -5,8 +5,6 @@
 
 #include "esvr/transfer_function.h"
 #include "esvr2vdb/jobs.h"
-#include "esvr2vdb/resolution.h"
-#include "esvr2vdb/splats.h"
 
 #include "programs/command_line.h"
 #include "programs/memory.h"

@@ -1,10 +1,12 @@
-#include "esvr2vdb/resolution.h"
+// The resolution of the written grids (--coarsen, --voxel-size).
+#include "esvr/resolution.h"
 
 #include <algorithm>
 #include <array>
 #include <string>
 
 #include "esvr/error.h"
+#include "esvr2vdb/jobs.h"
 
 namespace esvr::esvr2vdb {
 namespace {

@@ -1,5 +1,5 @@
 // Splats: writes a grid as splats, and a VDB from splats.
-#include "esvr2vdb/splats.h"
+#include "esvr2vdb/jobs.h"
 
 #include <algorithm>
 #include <string>

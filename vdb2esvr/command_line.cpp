@@ -7,7 +7,6 @@
 #include "programs/messages.h"
 #include "programs/sequence.h"
 #include "programs/splat_input.h"
-#include "vdb2esvr/paper.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -16,7 +16,6 @@
 #include "programs/messages.h"
 #include "programs/option_values.h"
 #include "programs/sequence.h"
-#include "vdb2esvr/paper.h"
 
 namespace esvr::vdb2esvr {
 

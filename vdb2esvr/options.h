@@ -1,8 +1,11 @@
 #pragma once
-/// The options of vdb2esvr, and the goals that single grids have instead of the goal of all others.
+/// The options of vdb2esvr, the goals that single grids have instead of the goal of all others, and the settings of the
+/// paper's method.
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +13,7 @@
 #include "esvr/container.h"
 #include "esvr/convert_file.h"
 #include "esvr/encode.h"
+#include "esvr/paper_method.h"
 #include "esvr/vdb_io.h"
 #include "programs/command_line.h"
 #include "programs/messages.h"
@@ -21,6 +25,8 @@
 namespace esvr::vdb2esvr {
 
 inline constexpr const char* kProgram = "vdb2esvr";
+/// The largest number of ellipsoids that options may name.
+inline constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
 
 /// The goal of a single grid.
 struct GridGoal {
@@ -76,6 +82,13 @@ struct Options {
 
 /// What `vdb2esvr --help` says, and the options that it has (command_line.cpp).
 [[nodiscard]] cli::CommandLine commandLine();
+
+/// The text of `--help paper`: every setting of --paper with its default.
+[[nodiscard]] std::string paperHelp();
+
+/// \param given  values of --paper: each is a list KEY=VALUE[,KEY=VALUE...] or "default"
+/// \throws UsageError  a key is unknown, given twice or has an invalid value
+[[nodiscard]] PaperMethod readPaperMethod(const std::vector<std::string>& given);
 
 /// Finds the places of the grids that options name.
 /// \throws BadInput  there is no grid of a name, or it is ambiguous; the text lists the grids

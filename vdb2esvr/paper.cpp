@@ -1,5 +1,4 @@
-// The option --paper and its part of the report.
-#include "vdb2esvr/paper.h"
+// The option --paper, which replaces our method by the paper's, and its part of the report.
 
 #include <functional>
 #include <limits>
@@ -12,6 +11,8 @@
 #include "esvr/error.h"
 #include "programs/messages.h"
 #include "programs/option_values.h"
+#include "vdb2esvr/options.h"
+#include "vdb2esvr/report.h"
 
 namespace esvr::vdb2esvr {
 

@@ -13,11 +13,6 @@ namespace esvr::vdb2esvr {
 
 // A run.
 
-bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind) {
-  return std::any_of(file.sections.begin(), file.sections.end(),
-                     [&](const SectionSummary& s) { return s.grid == grid && s.kind == kind; });
-}
-
 std::uint64_t bytesOf(const EsvrSummary& file, std::size_t grid, const std::string& kind) {
   std::uint64_t bytes = 0;
   for (const SectionSummary& s : file.sections)

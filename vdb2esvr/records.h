@@ -59,9 +59,6 @@ struct Ratio {
 /// Bytes of a grid of vectors in the file, without those that are shared with an earlier section.
 [[nodiscard]] std::uint64_t ownBytes(const EsvrSummary& file, const ConvertedVector& vector);
 
-/// True where the file holds a section of this kind for the grid.
-[[nodiscard]] bool hasSection(const EsvrSummary& file, std::size_t grid, const std::string& kind);
-
 /// Bytes of a grid's sections of a kind.
 [[nodiscard]] std::uint64_t bytesOf(const EsvrSummary& file, std::size_t grid,
                                     const std::string& kind);

@@ -10,8 +10,6 @@
 #include "programs/help_text.h"
 #include "programs/memory.h"
 #include "programs/names.h"
-#include "vdb2esvr/left_out.h"
-#include "vdb2esvr/paper.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -317,19 +315,6 @@ Json sharedOf(const ConvertedGrid& grid) {
           {"seconds", shared.seconds}};
 }
 
-/// The parts that the file does without. A figure that is not known has no key.
-Json leftOutOf(const RunRecord& record, std::size_t g) {
-  Json list = Json::array();
-  for (const LeftOut& note : leftOut(record, g)) {
-    Json entry{{"part", note.part}, {"why", note.why}, {"used", note.used}};
-    if (note.bytesWith) entry["bytes_with"] = *note.bytesWith;
-    if (note.bytesWithout) entry["bytes_without"] = *note.bytesWithout;
-    if (note.seconds) entry["seconds"] = *note.seconds;
-    list.push_back(entry);
-  }
-  return list;
-}
-
 Json metricsJson(const VolumeMetrics& m) {
   return {{"peak", m.peak},
           {"box_voxels", m.boxVoxels},
@@ -385,7 +370,6 @@ Json gridJson(const RunRecord& record, std::size_t g) {
           {"quality", qualityOf(grid.metrics)},
           {"surface", surfaceOf(grid.surface)},
           {"seconds", secondsJson(grid.seconds)},
-          {"left_out", leftOutOf(record, g)},
           {"curve", curveOf(grid.conversion.fit.curve)}};
 }
 

@@ -34,8 +34,6 @@
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/records.h"
 #include "vdb2esvr/report.h"
-#include "vdb2esvr/run_sequence.h"
-#include "vdb2esvr/summary.h"
 
 namespace esvr::vdb2esvr {
 namespace {

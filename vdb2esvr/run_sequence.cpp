@@ -1,5 +1,5 @@
 // Converts a sequence: each frame to a file, or all frames to one file in groups.
-#include "vdb2esvr/run_sequence.h"
+#include "vdb2esvr/run.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -30,8 +30,6 @@
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/records.h"
 #include "vdb2esvr/report.h"
-#include "vdb2esvr/run.h"
-#include "vdb2esvr/summary.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -135,7 +133,7 @@ cli::Verbosity verbosityOfFrames(const Options& options) {
 
 /// The largest number of frames that a GPU converts at the same time, since a conversion uses it for
 /// a part of its time only. Three groups at a time took a third of the time of one after the other
-/// (docs/sequences.md).
+/// (docs/scale.md).
 constexpr int kFramesOfGpu = 4;
 
 bool fitsOn(const Device& device, const Options& options) {

@@ -1,5 +1,5 @@
 // The tables that a run and a sequence print.
-#include "vdb2esvr/summary.h"
+#include "vdb2esvr/report.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 
 #include "programs/messages.h"
 #include "programs/names.h"
-#include "vdb2esvr/run_sequence.h"
+#include "vdb2esvr/run.h"
 
 namespace esvr::vdb2esvr {
 

@@ -2,8 +2,11 @@
 #include <zfp.h>
 #endif
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -231,9 +234,19 @@ SparseVolume BaselineEncoder::decode() const {
   state_->decodeZfp(voxels);
   const SparseVolume& source = state_->source.grid.volume;
   const SparseVolume volume =
-      baselines::sparsify(voxels.dense, source.background, baselines::activityThreshold(source));
+      baselines::sparsify(voxels.dense, source.background, activityThreshold(source));
   if (voxels.bricks.empty()) return volume;
   return baselines::unstackBricks(volume, voxels.bricks, source.origin);
+}
+
+float activityThreshold(const SparseVolume& volume) {
+  float smallest = std::numeric_limits<float>::infinity();
+  for (std::size_t b = 0; b < volume.brickCount(); ++b)
+    for (int i = 0; i < kBrickVoxels; ++i) {
+      const float difference = std::abs(volume.brickValues(b)[i] - volume.background);
+      if (volume.active[b].test(i) && difference > 0.0f) smallest = std::min(smallest, difference);
+    }
+  return std::isfinite(smallest) ? smallest / 2 : 0.0f;
 }
 
 }  // namespace esvr

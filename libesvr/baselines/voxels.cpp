@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "esvr/error.h"
@@ -134,16 +133,6 @@ SparseVolume sparsify(const DenseBox& dense, float background, float activeAbove
       for (int z = first.z; z <= last.z; ++z)
         appendBrick(dense, Coord{x, y, z} * kBrickSide, activeAbove, volume);
   return volume;
-}
-
-float activityThreshold(const SparseVolume& volume) {
-  float smallest = std::numeric_limits<float>::infinity();
-  for (std::size_t b = 0; b < volume.brickCount(); ++b)
-    for (int i = 0; i < kBrickVoxels; ++i) {
-      const float difference = std::abs(volume.brickValues(b)[i] - volume.background);
-      if (volume.active[b].test(i) && difference > 0.0f) smallest = std::min(smallest, difference);
-    }
-  return std::isfinite(smallest) ? smallest / 2 : 0.0f;
 }
 
 Box StackShape::box() const {

@@ -50,10 +50,6 @@ struct DenseBox {
 /// are active; other voxels keep their values. Bricks of background only are left out.
 [[nodiscard]] SparseVolume sparsify(const DenseBox& dense, float background, float activeAbove);
 
-/// Half of the smallest difference between an active voxel and the background. Active voxels that
-/// equal the background are ignored.
-[[nodiscard]] float activityThreshold(const SparseVolume& volume);
-
 // The bricks of a volume as one array, where its box does not fit into memory
 
 /// The arrangement of bricks in a stack: brick b is at (0, b / length, b % length). ZFP allows

@@ -110,4 +110,23 @@ std::string deviceName(const Device& device) {
 
 std::string cudaVersions() { return probeCuda().versions; }
 
+// Cancellation.
+
+namespace {
+
+thread_local const CancelToken* tokenOfThread = nullptr;
+
+}  // namespace
+
+CancelScope::CancelScope(const CancelToken* token) noexcept : outer_(tokenOfThread) {
+  tokenOfThread = token;
+}
+CancelScope::~CancelScope() { tokenOfThread = outer_; }
+
+const CancelToken* CancelScope::token() noexcept { return tokenOfThread; }
+
+void CancelScope::check() {
+  if (cancelled()) throw Cancelled();
+}
+
 }  // namespace esvr

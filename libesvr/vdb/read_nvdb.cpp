@@ -642,25 +642,15 @@ VolumeGrid readNanoVdbComponent(InputFile& file, std::size_t place, std::size_t 
   return grid;
 }
 
-VectorGrid readNanoVdbVector(InputFile& file, std::size_t place, ReadOptions options) {
+VectorGrid readNanoVdbVector(InputFile& file, std::size_t place, const ReadOptions& options) {
   const NanoPlace at(file, place);
   inGrid(at.uniqueName(), [&] { requireVectors(at); });
   const NanoBuffer buffer =
       inGrid(at.uniqueName(), [&] { return readNanoBuffer(file, at.entry(), options.maxBytes); });
-  VectorGrid vectors;
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    VolumeGrid component = inGrid(componentName(at.uniqueName(), c),
-                                  [&] { return readNanoVoxels(buffer, at.entry(), c, options); });
-    // The later components get the memory that this one leaves.
-    const std::uint64_t bytes = component.volume.values.size() * sizeof(float);
-    if (!options.memory.isInFile(bytes)) options.maxBytes -= std::min(options.maxBytes, bytes);
-    vectors.background[c] = component.descriptor.background;
-    if (c == 0) vectors.descriptor = std::move(component.descriptor);
-    vectors.components[c] = std::move(component.volume);
-    vectors.nonFiniteReplaced += component.nonFiniteReplaced;
-    vectors.inactive.add(component.inactive.ofComponent(c));
-  }
-  return vectors;
+  return joinedComponents(options, [&](std::size_t c, const ReadOptions& left) {
+    return inGrid(componentName(at.uniqueName(), c),
+                  [&] { return readNanoVoxels(buffer, at.entry(), c, left); });
+  });
 }
 
 }  // namespace esvr::vdb

@@ -550,20 +550,11 @@ VolumeGrid readListedComponent(Archive& archive, const ListedGrid& listed, std::
                      [&] { return readTree(archive, listed, component, options); });
 }
 
-VectorGrid readListedVector(Archive& archive, const ListedGrid& listed, ReadOptions options) {
-  VectorGrid vectors;
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    VolumeGrid component = readListedComponent(archive, listed, c, options);
-    // The later components get the memory that this one leaves.
-    const std::uint64_t bytes = component.volume.values.size() * sizeof(float);
-    if (!options.memory.isInFile(bytes)) options.maxBytes -= std::min(options.maxBytes, bytes);
-    vectors.background[c] = component.descriptor.background;
-    if (c == 0) vectors.descriptor = std::move(component.descriptor);
-    vectors.components[c] = std::move(component.volume);
-    vectors.nonFiniteReplaced += component.nonFiniteReplaced;
-    vectors.inactive.add(component.inactive.ofComponent(c));
-  }
-  return vectors;
+VectorGrid readListedVector(Archive& archive, const ListedGrid& listed,
+                            const ReadOptions& options) {
+  return joinedComponents(options, [&](std::size_t c, const ReadOptions& left) {
+    return readListedComponent(archive, listed, c, left);
+  });
 }
 
 PackedGrid readListedPacked(Archive& archive, const ListedGrid& listed,

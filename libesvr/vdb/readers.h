@@ -3,6 +3,7 @@
 /// file. Errors do not name the file. The unique names of summaries are not set.
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,11 +31,15 @@ VdbSummary inspectNanoVdb(InputFile& file);
 VolumeGrid readNanoVdbGrid(InputFile& file, std::size_t place, const ReadOptions& options);
 VolumeGrid readNanoVdbComponent(InputFile& file, std::size_t place, std::size_t component,
                                 const ReadOptions& options);
-VectorGrid readNanoVdbVector(InputFile& file, std::size_t place, ReadOptions options);
+VectorGrid readNanoVdbVector(InputFile& file, std::size_t place, const ReadOptions& options);
 
 // Of both (vdb_io.cpp).
 /// \throws BadInput  the file has no grid at this place
 void requireGrid(std::size_t place, std::size_t grids);
+/// The vectors of components that are read one after the other. Later components get the memory that earlier ones leave.
+VectorGrid joinedComponents(
+    ReadOptions options,
+    const std::function<VolumeGrid(std::size_t component, const ReadOptions& options)>& read);
 /// The reason, for the user, why a grid of this type is skipped.
 std::string notAFloatType(const std::string& valueType);
 

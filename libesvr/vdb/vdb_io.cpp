@@ -1,5 +1,8 @@
 #include "esvr/vdb_io.h"
 
+#include <algorithm>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -80,6 +83,23 @@ void requireGrid(std::size_t place, std::size_t grids) {
   if (place < grids) return;
   throw BadInput("has no grid number " + std::to_string(place + 1) + ", only " +
                  std::to_string(grids) + (grids == 1 ? " grid" : " grids"));
+}
+
+VectorGrid joinedComponents(
+    ReadOptions options,
+    const std::function<VolumeGrid(std::size_t component, const ReadOptions& options)>& read) {
+  VectorGrid vectors;
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    VolumeGrid component = read(c, options);
+    const std::uint64_t bytes = component.volume.values.size() * sizeof(float);
+    if (!options.memory.isInFile(bytes)) options.maxBytes -= std::min(options.maxBytes, bytes);
+    vectors.background[c] = component.descriptor.background;
+    if (c == 0) vectors.descriptor = std::move(component.descriptor);
+    vectors.components[c] = std::move(component.volume);
+    vectors.nonFiniteReplaced += component.nonFiniteReplaced;
+    vectors.inactive.add(component.inactive.ofComponent(c));
+  }
+  return vectors;
 }
 
 std::string notAFloatType(const std::string& valueType) {

@@ -2,7 +2,7 @@
 // `node build.mjs` writes dist/ and programs/dist/, `node build.mjs --check` fails if they are not
 // what it would write.
 import { build } from "esbuild";
-import { decoded, encoded } from "./src/local/base91.js";
+import { decoded, encoded } from "./src/local/packing.js";
 import { gunzipSync, gzipSync } from "node:zlib";
 import { mkdir, readFile, writeFile } from "node:fs/promises";
 import { dirname, join, relative } from "node:path";

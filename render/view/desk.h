@@ -10,7 +10,6 @@
 
 #include "esvr/volume.h"
 #include "render/view/collection.h"
-#include "render/view/outlet.h"
 #include "render/view/studio.h"
 
 namespace esvr::view {

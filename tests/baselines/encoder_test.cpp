@@ -1,18 +1,92 @@
-// Plan: each form stores a soft ball and gives back its voxels. Lossless forms give back every
-// voxel, half floats are within half a unit in the last place, quantised forms within a step of the
-// leaf's range, and FpN and ZFP within their bounds. Forms that do not fit the grid are refused.
+// Plan: the text of every setting is parsed to the same setting. Other texts are refused with a list of the valid ones.
+//
+// Each form stores a soft ball and gives back its voxels. Lossless forms give back every voxel, half floats are within half
+// a unit in the last place, quantised forms within a step of the leaf's range, and FpN and ZFP within their bounds. Forms
+// that do not fit the grid are refused.
+//
+// A search ends within its limit and near it, and its result is the best of its trials. FpN and ZFP reach a PSNR, and no
+// smaller trial reaches it. Goals that cannot be reached are reported.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "baselines/grids.h"
+#include <algorithm>
+#include <cmath>
+
 #include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
+#include "esvr/vdb_io.h"
+#include "metrics/volumes.h"
 #include "support/temporary_folder.h"
 
 namespace esvr {
 namespace {
+
+/// A soft ball of radius 12 around (20, 20, 20), whose values fall from 1 to 0.
+VolumeGrid ballGrid() {
+  VolumeGrid grid;
+  grid.descriptor.name = "density";
+  grid.descriptor.gridClass = GridClass::kFogVolume;
+  grid.descriptor.transform = uniformTransform(0.5);
+  std::vector<test::Voxel> voxels;
+  for (int x = 8; x <= 32; ++x)
+    for (int y = 8; y <= 32; ++y)
+      for (int z = 8; z <= 32; ++z) {
+        const int r2 = (x - 20) * (x - 20) + (y - 20) * (y - 20) + (z - 20) * (z - 20);
+        if (r2 < 144) voxels.push_back({{x, y, z}, 1.0f - float(r2) / 144.0f});
+      }
+  grid.volume = test::volumeOf(voxels);
+  return grid;
+}
+
+// Settings.
+
+class SettingText : public testing::TestWithParam<const char*> {};
+
+TEST_P(SettingText, comesBackAsItWas) {
+  EXPECT_EQ(toString(parseBaseline(GetParam())), GetParam());
+}
+
+INSTANTIATE_TEST_SUITE_P(All, SettingText,
+                         testing::Values("vdb-float-blosc", "vdb-half-zip", "vdb-half",
+                                         "nvdb-float", "nvdb-fp16-zip", "nvdb-fp8-blosc",
+                                         "nvdb-fp4,threshold=0.125",
+                                         "nvdb-fpn-zip,tolerance=0.1,threshold=0.3",
+                                         "nvdb-fpn,tolerance=1e-30", "zfp,accuracy=0.25",
+                                         "zfp-bricks,accuracy=0.25", "zfp,precision=6"));
+
+TEST(Setting, keepsAllDigits) {
+  const double third = 1.0 / 3.0;
+  const BaselineSetting setting{.how = VoxelPacking{PackedForm::kNanoFpN, PackedCodec::kZip, third},
+                                .threshold = third / 7};
+  const auto back = parseBaseline(toString(setting));
+  EXPECT_EQ(std::get<VoxelPacking>(back.how).tolerance, third);
+  EXPECT_EQ(back.threshold, third / 7);
+}
+
+class RefusedSetting : public testing::TestWithParam<const char*> {};
+
+TEST_P(RefusedSetting, isNoBaseline) { EXPECT_THROW((void)parseBaseline(GetParam()), UsageError); }
+
+INSTANTIATE_TEST_SUITE_P(All, RefusedSetting,
+                         testing::Values("", "gzip", "vdb", "nvdb-fpn-zip",
+                                         "nvdb-fpn-zip,tolerance=0", "nvdb-fpn-zip,tolerance=x",
+                                         "nvdb-fp8,tolerance=0.1", "vdb-half,threshold",
+                                         "vdb-half,threshold=-1", "vdb-half,threshold=inf", "zfp",
+                                         "zfp,rate=4", "zfp,accuracy=0.1,threshold=0.1"));
+
+TEST(Setting, listsTheValidSettings) {
+  try {
+    (void)parseBaseline("gzip");
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(),
+                testing::AllOf(testing::HasSubstr("gzip"), testing::HasSubstr("nvdb-fpn")));
+  }
+}
+
+// Forms.
 
 struct Form {
   const char* setting;
@@ -22,7 +96,7 @@ std::ostream& operator<<(std::ostream& out, const Form& form) { return out << fo
 
 class BaselineForm : public testing::TestWithParam<Form> {
  protected:
-  VolumeGrid grid_ = test::ballGrid();
+  VolumeGrid grid_ = ballGrid();
   test::TemporaryFolder folder_;
   BaselineEncoder encoder_{
       {.grid = grid_, .box = activeBox(grid_.volume), .folder = folder_.path()}};
@@ -93,11 +167,139 @@ TEST_F(Encoder, saysWhatItCannotDo) {
   } else {
     EXPECT_THROW(encoder_.encode(parseBaseline("zfp,precision=3")), UsageError);
   }
-  VolumeGrid large = test::ballGrid();
+  VolumeGrid large = ballGrid();
   for (float& value : large.volume.values) value *= 1e6f;
   BaselineEncoder encoder(
       {.grid = large, .box = activeBox(large.volume), .folder = folder_.path()});
   EXPECT_THROW(encoder.encode(parseBaseline("vdb-half-blosc")), UsageError);
+}
+
+// Searches.
+
+class Matching : public testing::Test {
+ protected:
+  VolumeGrid grid_ = ballGrid();
+  test::TemporaryFolder folder_;
+  BaselineEncoder encoder_{
+      {.grid = grid_, .box = activeBox(grid_.volume), .folder = folder_.path()}};
+};
+
+void expectBestOfSteps(const Match& match) {
+  for (const auto& step : match.steps) {
+    if (std::isnan(step.psnr)) continue;
+    EXPECT_LE(step.psnr, match.best.psnr) << toString(step.setting);
+  }
+}
+
+class MatchingForms : public Matching, public testing::WithParamInterface<const char*> {};
+
+TEST_P(MatchingForms, fillsTheSizeAskedFor) {
+  const auto like = parseBaseline(GetParam());
+  const std::uint64_t all = encoder_.encode(like).bytes;
+  const std::uint64_t bytes = all * 6 / 10;
+  const Match match = matchSize(encoder_, like, bytes);
+  ASSERT_TRUE(match.found);
+  EXPECT_LE(match.best.bytes, bytes);
+  // The ball has about 400 distinct values, so a step of the threshold changes the bytes by less
+  // than 1 %.
+  EXPECT_GE(double(match.best.bytes), 0.9 * double(bytes));
+  EXPECT_GT(match.best.setting.threshold, 0.0);
+  EXPECT_EQ(encoder_.encode(match.best.setting).bytes, match.best.bytes) << "the row's command";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, MatchingForms,
+                         testing::Values("vdb-half-blosc", "nvdb-float-zip", "nvdb-fp16-zip",
+                                         "nvdb-fp8-zip", "nvdb-fp4-zip"));
+
+TEST_F(Matching, takesAllVoxelsWhereThereIsRoom) {
+  const Match match = matchSize(encoder_, parseBaseline("vdb-half-blosc"), 10'000'000);
+  ASSERT_TRUE(match.found);
+  EXPECT_EQ(match.best.setting.threshold, 0.0);
+  EXPECT_EQ(match.steps.size(), 1u);
+}
+
+TEST_F(Matching, findsNothingBelowTheSmallestFile) {
+  const Match match = matchSize(encoder_, parseBaseline("nvdb-fp8"), 5000);
+  EXPECT_FALSE(match.found);
+  EXPECT_FALSE(match.steps.empty()) << "the search is shown";
+}
+
+TEST_F(Matching, looksForFpNsBestTolerance) {
+  const std::uint64_t bytes = 4000;
+  const Match match = matchSize(encoder_, parseBaseline("nvdb-fpn-zip,tolerance=1"), bytes);
+  ASSERT_TRUE(match.found);
+  EXPECT_LE(match.best.bytes, bytes);
+  expectBestOfSteps(match);
+}
+
+TEST_F(Matching, reachesAPsnrWithFpN) {
+  const Match match = matchPsnr(encoder_, parseBaseline("nvdb-fpn-zip,tolerance=1"), {45.0});
+  ASSERT_TRUE(match.found);
+  EXPECT_GE(match.best.psnr, 45.0);
+  for (const auto& step : match.steps) {
+    if (step.psnr < 45.0) continue;
+    EXPECT_GE(step.bytes, match.best.bytes);
+  }
+}
+
+TEST_F(Matching, matchesSizeAndPsnrWithZfp) {
+  if (zfpVersion().empty()) GTEST_SKIP() << "built without ZFP";
+  for (const char* like : {"zfp,accuracy=1", "zfp,precision=1", "zfp-bricks,accuracy=1"}) {
+    const Match size = matchSize(encoder_, parseBaseline(like), 6000);
+    ASSERT_TRUE(size.found) << like;
+    EXPECT_LE(size.best.bytes, 6000u);
+    expectBestOfSteps(size);
+    const Match psnr = matchPsnr(encoder_, parseBaseline(like), {45.0});
+    ASSERT_TRUE(psnr.found) << like;
+    EXPECT_GE(psnr.best.psnr, 45.0);
+  }
+}
+
+TEST_F(Matching, dropsVoxelsDownToAPsnrOverTheActiveVoxels) {
+  const MatchGoal goal{.psnr = 22.0, .active = true, .dropsVoxels = true};
+  const Match match = matchPsnr(encoder_, parseBaseline("nvdb-fp4-zip"), goal);
+  ASSERT_TRUE(match.found);
+  EXPECT_GT(match.best.setting.threshold, 0.0);
+  encoder_.encode(match.best.setting);
+  const auto metrics = compareVolumes(grid_.volume, encoder_.decode());
+  EXPECT_EQ(metrics.psnrActive, match.best.psnr) << "not that over the box";
+  EXPECT_GE(match.best.psnr, goal.psnr);
+  // The values of the ball are multiples of 1/144, of which at most two in a row are missing, as
+  // those of r^2 = 111 and 112, which are no sums of three squares.
+  auto next = match.best.setting;
+  next.threshold += 3.01 / 144;
+  encoder_.encode(next);
+  EXPECT_LT(compareVolumes(grid_.volume, encoder_.decode()).psnrActive, goal.psnr);
+}
+
+TEST_F(Matching, triesTolerancesWithThresholds) {
+  const auto like = parseBaseline("nvdb-fpn-zip,tolerance=1");
+  MatchGoal goal{.psnr = 22.0, .active = true};
+  const Match all = matchPsnr(encoder_, like, goal);
+  goal.dropsVoxels = true;
+  const Match some = matchPsnr(encoder_, like, goal);
+  ASSERT_TRUE(all.found && some.found);
+  EXPECT_LE(some.best.bytes, all.best.bytes);
+  EXPECT_GE(some.best.psnr, goal.psnr);
+  const auto hasThreshold = [](const MatchStep& step) { return step.setting.threshold > 0.0; };
+  EXPECT_TRUE(std::ranges::any_of(some.steps, hasThreshold));
+}
+
+TEST_F(Matching, findsNoThresholdWhereAllVoxelsAreTooCoarse) {
+  const MatchGoal goal{.psnr = 90.0, .active = true, .dropsVoxels = true};
+  EXPECT_FALSE(matchPsnr(encoder_, parseBaseline("nvdb-fp4-zip"), goal).found);
+}
+
+TEST_F(Matching, knowsNoPsnrOfOtherForms) {
+  EXPECT_THROW((void)matchPsnr(encoder_, parseBaseline("vdb-half-blosc"), {40.0}), UsageError);
+}
+
+TEST_F(Matching, stopsWhenCancelled) {
+  CancelToken token;
+  BaselineEncoder encoder(
+      {.grid = grid_, .box = activeBox(grid_.volume), .folder = folder_.path(), .cancel = &token});
+  token.cancel();
+  EXPECT_THROW((void)matchSize(encoder, parseBaseline("vdb-half-blosc"), 1000), Cancelled);
 }
 
 }  // namespace

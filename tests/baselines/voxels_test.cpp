@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "metrics/volumes.h"
 

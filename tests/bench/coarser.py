@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """coarser.py BUILD VDB_LOD FILE.vdb...: compares coarser grids of esvr2vdb --coarsen with those of OpenVDB's vdb_lod.
 
-Prints a row for each file, factor and program, as in docs/figures/coarser.md: the bytes and the seconds of the
+Prints a row for each file, factor and program, as in docs/figures/benchmarks.md: the bytes and the seconds of the
 program, and the errors of its voxels against the average of the source over the space of each coarse voxel, which is
 computed here in float64 at the places that the transform of the output says. vdb_lod reads the source, and esvr2vdb a
 lossless file, a file with --max-error 1%, and the ellipsoids of --psnr 40 --representation ellipsoids.

@@ -199,7 +199,7 @@ def resolution(bench):
 
 
 def sequences(bench):
-    """A file for each frame against one file of all frames (docs/sequences.md)."""
+    """A file for each frame against one file of all frames (docs/scale.md)."""
     for folder, pattern in {"sequence": "gas_####", "fire": "fluid_data_####"}.items():
         for way, out in {"files": "frame.####.esvr", "one file": "all.esvr"}.items():
             def measured(folder=folder, pattern=pattern, way=way, out=out):
@@ -231,7 +231,7 @@ def sharing(bench):
 
 
 def chunks(bench):
-    """Fits in chunks against one fit of the whole volume, with a count that grows with the volume (docs/scale.md)."""
+    """Fits in chunks against one fit of the whole volume, with a count that grows with the volume (docs/figures/scale.md)."""
     for side in (256, 512, 1024):
         for voxels in (None, 50_000, 200_000):
             def measured(side=side, voxels=voxels):

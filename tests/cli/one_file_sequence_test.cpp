@@ -58,12 +58,6 @@ class OneFile : public test::FolderTest {
     return vdb2esvr(wordsFor(output, more));
   }
   [[nodiscard]] std::string bytesOf(const std::string& name) const { return readText(at(name)); }
-  /// The names of all files that are no inputs.
-  [[nodiscard]] Words outputs() const {
-    Words names = folder_.names();
-    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
-    return names;
-  }
   [[nodiscard]] std::vector<std::int64_t> numbersIn(const std::string& name) const {
     std::vector<std::int64_t> numbers;
     const SequenceReader reader(at(name));

@@ -62,6 +62,12 @@ class FolderTest : public testing::Test {
   [[nodiscard]] std::uintmax_t sizeOf(const std::string& name) const {
     return std::filesystem::file_size(at(name));
   }
+  /// The names of all files that are no inputs, whose names begin with "in.".
+  [[nodiscard]] std::vector<std::string> outputs() const {
+    std::vector<std::string> names = folder_.names();
+    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
+    return names;
+  }
   TemporaryFolder folder_;
 };
 

@@ -26,6 +26,7 @@ namespace {
 using test::bytesIn;
 using test::namesIn;
 using test::readText;
+using test::Refusal;
 using test::runInterrupted;
 using test::vdb2esvr;
 using testing::AllOf;
@@ -61,12 +62,6 @@ class SequenceFiles : public test::FolderTest {
     return test::quickFit(at("in.####.vdb"), at("out.####.esvr"), more);
   }
   [[nodiscard]] bool isThere(const std::string& name) const { return fs::exists(at(name)); }
-  /// The names of files and folders whose names begin with "out".
-  [[nodiscard]] Words outputs() const {
-    Words names = folder_.names();
-    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
-    return names;
-  }
 };
 
 TEST_F(SequenceFiles, haveTheBytesOfSingleFilesOnAnyNumberOfThreads) {
@@ -322,39 +317,30 @@ TEST_F(SequenceFiles, thatHaveTheNameOfAPatternAreFiles) {
   EXPECT_TRUE(isThere("out.esvr"));
 }
 
-struct BadSequence {
-  Words arguments;
-  int code;
-  const char* words;
-};
-std::ostream& operator<<(std::ostream& out, const BadSequence& bad) { return out << bad.words; }
-
-class RefusedSequence : public SequenceFiles, public testing::WithParamInterface<BadSequence> {};
+class RefusedSequence : public SequenceFiles, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedSequence, saysWhy) {
   writeFrames(2);
-  Words arguments = GetParam().arguments;
-  arguments[0] = at(arguments[0]), arguments[1] = at(arguments[1]);
-  const auto run = vdb2esvr(arguments);
-  EXPECT_EQ(run.exitCode, GetParam().code);
-  EXPECT_THAT(run.err, HasSubstr(GetParam().words));
+  GetParam().expectOf(vdb2esvr(GetParam().argumentsIn(folder_)));
   EXPECT_THAT(outputs(), IsEmpty());
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Options, RefusedSequence,
     testing::Values(
-        BadSequence{{"in.####.vdb", "out.png"}, 2, "must end in .esvr"},
-        BadSequence{{"in.0001.vdb", "out.esvr", "--frames", "1"}, 2, "--frames needs a sequence"},
-        BadSequence{{"in.0001.vdb", "out.esvr", "--missing", "skip"}, 2, "--missing needs"},
-        BadSequence{{"in.0001.vdb", "out.esvr", "--on-error", "stop"}, 2, "--on-error needs"},
-        BadSequence{{"in.####.vdb", "out.####.esvr", "--frames", "1-x"}, 2, "'1-x' is no range"},
-        BadSequence{{"in.####.vdb", "out.####.esvr", "--missing", "x"}, 2, "error, hold, skip"},
-        BadSequence{{"in.####.vdb", "out.####.esvr", "--on-error", "x"}, 2, "continue, stop"},
-        BadSequence{{"in.####.vdb", "out.####.png"}, 2, "must end in .esvr"},
-        BadSequence{{"in.@.vdb", "out.@.esvr"}, 3, "has another number of digits"},
-        BadSequence{{"no.####.vdb", "out.####.esvr"}, 3, "no file matches"},
-        BadSequence{{"in.####.vdb", "out.####.esvr", "--resume", "-f"}, 2, "choose one"}));
+        Refusal{{"DIR/in.####.vdb", "DIR/out.png"}, 2, "must end in .esvr"},
+        Refusal{
+            {"DIR/in.0001.vdb", "DIR/out.esvr", "--frames", "1"}, 2, "--frames needs a sequence"},
+        Refusal{{"DIR/in.0001.vdb", "DIR/out.esvr", "--missing", "skip"}, 2, "--missing needs"},
+        Refusal{{"DIR/in.0001.vdb", "DIR/out.esvr", "--on-error", "stop"}, 2, "--on-error needs"},
+        Refusal{
+            {"DIR/in.####.vdb", "DIR/out.####.esvr", "--frames", "1-x"}, 2, "'1-x' is no range"},
+        Refusal{{"DIR/in.####.vdb", "DIR/out.####.esvr", "--missing", "x"}, 2, "error, hold, skip"},
+        Refusal{{"DIR/in.####.vdb", "DIR/out.####.esvr", "--on-error", "x"}, 2, "continue, stop"},
+        Refusal{{"DIR/in.####.vdb", "DIR/out.####.png"}, 2, "must end in .esvr"},
+        Refusal{{"DIR/in.@.vdb", "DIR/out.@.esvr"}, 3, "has another number of digits"},
+        Refusal{{"DIR/no.####.vdb", "DIR/out.####.esvr"}, 3, "no file matches"},
+        Refusal{{"DIR/in.####.vdb", "DIR/out.####.esvr", "--resume", "-f"}, 2, "choose one"}));
 
 using Json = nlohmann::json;
 

@@ -1,13 +1,22 @@
-// Plan: volumes are made from bricks in any order and anywhere, searched and measured, and broken ones are
-// found. The voxels that hold a box are those of the definition in small cases. Components of vectors get the bricks and the active voxels of all of them, with their own
-// backgrounds, also if one has no brick; lengths are those of the vectors voxel by voxel.
-
-#include "esvr/volume.h"
+// Plan: volumes are made from bricks in any order and anywhere, searched and measured, and broken ones are found. The
+// voxels that hold a box are those of the definition in small cases. Components of vectors get the bricks and the active
+// voxels of all of them, with their own backgrounds, also if one has no brick; lengths are those of the vectors voxel by
+// voxel.
+//
+// The regions of the empty space are compared with a flood fill of all places in a box, for shells with one and with two
+// hollows, a solid, and a shell with a hole through which the inside reaches infinity. A place beyond the box is outside.
+// Volumes at negative coordinates give the same.
+//
+// Counts, ranges and the comparison of inactive values follow from the values and their voxels alone, whatever the order
+// and the tiles. Any change of a value, a voxel or an axis makes values different.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -15,12 +24,15 @@
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 namespace {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
+
+// Bricks and voxels.
 
 /// A brick at `corner` with one active voxel of value 1. The other voxels hold 9, which functions
 /// of active voxels must ignore.
@@ -356,6 +368,143 @@ TEST(Vectors, WhoseSquaresExceedFloatHaveLengths) {
 TEST(Vectors, WithoutVoxelsHaveNone) { EXPECT_EQ(magnitudeOf({}).brickCount(), 0u); }
 
 TEST(Vectors, NameTheirComponents) { EXPECT_EQ(componentName("v[1]", 2), "v[1].z"); }
+
+// Signs of the empty space.
+
+constexpr int kSide = 8;  // bricks along an edge of the box
+
+/// True if a voxel of a brick touches a place that is inside through a face of the brick.
+bool touchesInside(Coord brick, Coord local, const std::function<bool(Coord)>& isInside) {
+  const auto step = [](int at) { return at == 0 ? -1 : at == kBrickSide - 1 ? 1 : 0; };
+  const Coord s{step(local.x), step(local.y), step(local.z)};
+  return isInside(brick + Coord{s.x, 0, 0}) || isInside(brick + Coord{0, s.y, 0}) ||
+         isInside(brick + Coord{0, 0, s.z});
+}
+
+/// A volume with bricks where `has` says so. Their slices have the sign of the places beside them.
+SparseVolume bricksWhere(Coord shift, const std::function<bool(Coord)>& has,
+                         const std::function<bool(Coord)>& isInside) {
+  std::vector<BrickInput> bricks;
+  for (int x = 0; x < kSide; ++x)
+    for (int y = 0; y < kSide; ++y)
+      for (int z = 0; z < kSide; ++z) {
+        if (!has({x, y, z})) continue;
+        BrickInput brick{(Coord{x, y, z} + shift) * kBrickSide, {}, {}};
+        brick.active.setAll();
+        for (int v = 0; v < kBrickVoxels; ++v)
+          brick.values[std::size_t(v)] =
+              touchesInside({x, y, z}, voxelLocal(v), isInside) ? -1.0f : 0.0f;
+        bricks.push_back(brick);
+      }
+  return makeVolume(std::move(bricks), 3.0f);
+}
+
+bool within(Coord p, int low, int high) {
+  return std::min({p.x, p.y, p.z}) >= low && std::max({p.x, p.y, p.z}) <= high;
+}
+
+TEST(EmptySigns, AreThoseInsideAndOutsideOfShells) {
+  const auto hollow = [](Coord p) { return within(p, 3, 4); };
+  for (const Coord shift : {Coord{0, 0, 0}, Coord{-20, -3, 7}}) {
+    const SparseVolume shell = bricksWhere(
+        shift, [&](Coord p) { return within(p, 2, 5) && !hollow(p); }, hollow);
+    const EmptySigns signs(shell);
+    EXPECT_TRUE(signs.agree());
+    for (int x = -1; x <= kSide; ++x)
+      for (int y = -1; y <= kSide; ++y)
+        for (int z = -1; z <= kSide; ++z)
+          if (const Coord p{x, y, z}; !within(p, 2, 5) || hollow(p)) {
+            ASSERT_EQ(signs.isInside(p + shift), hollow(p)) << x << ' ' << y << ' ' << z;
+          }
+  }
+}
+
+TEST(EmptySigns, OfTwoHollowsAreTheirOwn) {
+  const auto inside = [](Coord p) { return within(p, 1, 2); };
+  const auto cavity = [](Coord p) { return within(p, 5, 6); };  // outside, though enclosed
+  const EmptySigns signs(bricksWhere(
+      {}, [&](Coord p) { return within(p, 0, 7) && !inside(p) && !cavity(p); }, inside));
+  EXPECT_TRUE(signs.agree());
+  EXPECT_TRUE(signs.isInside({1, 2, 1}));
+  EXPECT_FALSE(signs.isInside({5, 6, 5}));
+  EXPECT_FALSE(signs.isInside({100, 2, 1}));
+}
+
+TEST(EmptySigns, DisagreeAroundAHole) {
+  const auto hollow = [](Coord p) { return within(p, 3, 4); };
+  const auto shell = [&](Coord p) { return within(p, 2, 5) && !hollow(p); };
+  EXPECT_TRUE(EmptySigns(bricksWhere({}, shell, hollow)).agree());
+  for (const Coord hole : {Coord{2, 3, 3}, Coord{3, 5, 4}, Coord{4, 3, 5}})
+    EXPECT_FALSE(EmptySigns(bricksWhere(
+                                {}, [&](Coord p) { return shell(p) && p != hole; }, hollow))
+                     .agree());
+}
+
+TEST(EmptySigns, WithoutAHollowAreOutside) {
+  const auto solid = [](Coord p) { return within(p, 2, 4); };
+  const EmptySigns signs(bricksWhere({}, solid, [](Coord) { return false; }));
+  EXPECT_TRUE(signs.agree());
+  EXPECT_FALSE(signs.isInside({0, 0, 0}));
+  EXPECT_FALSE(EmptySigns(bricksWhere({}, solid, [](Coord) { return true; })).agree());
+}
+
+// Inactive values.
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+InactiveValues one(double value, Coord voxel) {
+  InactiveValues values;
+  values.add(value, voxel);
+  return values;
+}
+
+TEST(InactiveValues, OfATileAreThoseOfItsVoxels) {
+  const Box tile{{-4, 8, 100}, {3, 15, 107}};
+  InactiveValues whole, voxels;
+  whole.add(2.5, tile);
+  for (int x = tile.max.x; x >= tile.min.x; --x)
+    for (int y = tile.min.y; y <= tile.max.y; ++y)
+      for (int z = tile.min.z; z <= tile.max.z; ++z) voxels.add(2.5, Coord{x, y, z});
+  EXPECT_EQ(whole, voxels);
+  EXPECT_EQ(whole.count(), 512u);
+}
+
+TEST(InactiveValues, DifferByValueVoxelAndAxis) {
+  const InactiveValues values = one(1.0, {1, 2, 3});
+  EXPECT_EQ(values, one(1.0, {1, 2, 3}));
+  EXPECT_FALSE(values == one(1.5, {1, 2, 3}));
+  EXPECT_FALSE(values == one(-1.0, {1, 2, 3}));
+  EXPECT_FALSE(values == one(1.0, {3, 2, 1}));
+  EXPECT_FALSE(values == one(1.0, {1, 2, 4}));
+  EXPECT_FALSE(values == InactiveValues());
+  EXPECT_EQ(one(kNan, {}), one(kNan, {}));
+  EXPECT_EQ(one(0.0, {}), one(-0.0, {})) << "equal values";
+}
+
+TEST(InactiveValues, DifferByComponent) {
+  InactiveValues x, y;
+  x.add(one(1.0, {}).ofComponent(0));
+  y.add(one(1.0, {}).ofComponent(1));
+  EXPECT_FALSE(x == y);
+}
+
+TEST(InactiveValues, HaveARangeOfTheFiniteOnes) {
+  InactiveValues values = one(kNan, {7, 8, 9});
+  EXPECT_EQ(values.nonFinite(), 1u);
+  values.add(-3.0, Coord{0, 0, 1});
+  values.add(one(-2.0, {0, 0, 2}));
+  EXPECT_EQ(values.min(), -3.0);
+  EXPECT_EQ(values.max(), -2.0);
+  EXPECT_EQ(toText(values),
+            "3 inactive values (-3 to -2, and 1 NaN or infinite, first at (7, 8, 9))");
+  EXPECT_EQ(toText(one(5.0, {1, 2, 3})), "1 inactive value (5, first at (1, 2, 3))");
+}
+
+TEST(InactiveValues, OfTheLargestTileAreCounted) {
+  InactiveValues values;
+  values.add(1.0, Box{{0, 0, 0}, {4095, 4095, 4095}});
+  EXPECT_EQ(values.count(), std::uint64_t{1} << 36);
+}
 
 }  // namespace
 }  // namespace esvr

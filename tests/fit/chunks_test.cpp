@@ -1,20 +1,33 @@
-// Plan: constants of a target act like ellipsoids that are not fitted. A fit in chunks is nearly as
-// good as a fit in one chunk, also at the seams, gives the same bits again, on any number of threads
-// and of workers, continues from a field, and ends when it is cancelled. A volume that fits into one
-// chunk is fitted as usual.
+// Plan: every brick belongs to one chunk, and the chunks' boxes fill space. Planes halve the bricks. A box that grows ends
+// where coordinates end. A volume whose fit exceeds the memory is divided. The ellipsoids of the chunks add up to the wanted
+// number and keep to their limits, equal chunks get equal numbers, and where the numbers are the best ones, moving an
+// ellipsoid does not lower the error.
+//
+// The bytes of a part's end give the end back, and damaged bytes are refused. The key of a part changes with everything
+// that the result depends on, and with nothing else.
+//
+// Constants of a target act like ellipsoids that are not fitted. A fit in chunks is nearly as good as a fit in one chunk,
+// also at the seams, gives the same bits again, on any number of threads and of workers, continues from a field, and ends
+// when it is cancelled. A volume that fits into one chunk is fitted as usual.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
+#include <set>
 
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
 #include "esvr/workers.h"
+#include "fit/chunks/divide.h"
 #include "fit/chunks/fit_in_chunks.h"
+#include "fit/chunks/part.h"
 #include "fit/cpu/cpu_pass.h"
 #include "random_ellipsoids.h"
 #include "support/on_device.h"
@@ -22,6 +35,232 @@
 
 namespace esvr {
 namespace {
+
+// The division of a volume.
+
+TEST(DivideBricks, GivesEveryBrickToTheChunkWhoseBoxContainsIt) {
+  const SparseVolume volume = test::tubeVolume();
+  const auto chunks = divideBricks(volume, 5);
+  ASSERT_GT(chunks.size(), 4u);
+  std::set<std::uint32_t> seen;
+  for (const BrickChunk& chunk : chunks) {
+    EXPECT_LE(chunk.bricks.size(), 5u);
+    std::uint64_t active = 0;
+    for (const std::uint32_t b : chunk.bricks) {
+      EXPECT_TRUE(seen.insert(b).second);
+      EXPECT_TRUE(chunk.bounds.contains(volume.bricks[b]));
+      active += std::uint64_t(volume.active[b].count());
+    }
+    EXPECT_EQ(active, chunk.activeVoxels);
+  }
+  EXPECT_EQ(seen.size(), volume.brickCount());
+}
+
+TEST(DivideBricks, MakesBoxesThatFillSpaceWithoutOverlap) {
+  const auto chunks = divideBricks(test::tubeVolume(), 10);
+  for (const Coord place : {Coord{0, 0, 0}, Coord{2, 3, 1}, Coord{-100, 2, 5},
+                            Coord{Box::kMax, Box::kMin, 0}, Coord{Box::kMin, 0, Box::kMax}})
+    EXPECT_EQ(std::count_if(chunks.begin(), chunks.end(),
+                            [&](const BrickChunk& c) { return c.box.contains(place); }),
+              1);
+}
+
+TEST(DivideBricks, EndsAtSingleBricks) {
+  const SparseVolume volume = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
+  for (const std::size_t most : {0, 1}) {
+    const auto chunks = divideBricks(volume, most);
+    ASSERT_EQ(chunks.size(), 8u);
+    for (const BrickChunk& chunk : chunks) EXPECT_EQ(chunk.activeVoxels, 512u);
+  }
+}
+
+/// A volume whose bricks are at these places on the x axis.
+SparseVolume columnOf(const std::vector<int>& places) {
+  SparseVolume volume;
+  for (const int x : places) volume.bricks.push_back({x, 0, 0});
+  volume.values.resize(places.size() * kBrickVoxels);
+  volume.active.resize(places.size());
+  return volume;
+}
+
+std::vector<std::size_t> sizesOf(const std::vector<BrickChunk>& chunks) {
+  std::vector<std::size_t> sizes;
+  for (const BrickChunk& chunk : chunks) sizes.push_back(chunk.bricks.size());
+  return sizes;
+}
+
+TEST(DivideBricks, HalvesTheBricks) {
+  using testing::ElementsAre;
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2, 3, 4, 5, 6, 7}), 4)), ElementsAre(4, 4));
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2}), 2)), ElementsAre(1, 2));
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1'000'000}), 1)), ElementsAre(1, 1));
+  EXPECT_THAT(sizesOf(divideBricks(columnOf({0, 1, 2, 100'000'000}), 2)), ElementsAre(2, 2));
+}
+
+TEST(DivideBricks, PutsThePlaneWhereBothSidesAreNearlyEqual) {
+  SparseVolume volume;  // six bricks at 0, one at 1 and one at 2
+  for (int y = 0; y < 6; ++y) volume.bricks.push_back({0, y % 2, y / 2});
+  volume.bricks.push_back({1, 0, 0});
+  volume.bricks.push_back({9, 0, 0});
+  volume.values.resize(8 * kBrickVoxels);
+  volume.active.resize(8);
+  EXPECT_THAT(sizesOf(divideBricks(volume, 7)), testing::ElementsAre(6, 2));
+}
+
+TEST(Dilated, EndsWhereCoordinatesEnd) {
+  const Box all = dilated(Box::whole(), 3);
+  EXPECT_EQ(all, Box::whole());
+  EXPECT_EQ(dilated({{1, 2, 3}, {4, 5, 6}}, 2), (Box{{-1, 0, 1}, {6, 7, 8}}));
+}
+
+/// A row of bricks whose voxels are all active.
+SparseVolume rowOfBricks(std::int32_t count) {
+  SparseVolume volume;
+  for (std::int32_t x = 0; x < count; ++x) volume.bricks.push_back({x, 0, 0});
+  volume.active.resize(volume.brickCount());
+  for (BrickMask& mask : volume.active) mask.setAll();
+  volume.values.assign(volume.brickCount() * kBrickVoxels, 1.0f);
+  return volume;
+}
+
+// A fit takes about 8 KB of the host's memory for each brick (divide.cpp).
+TEST(ChunksFor, DividesAVolumeWhoseFitExceedsTheMemoryOfTheHost) {
+  const SparseVolume volume = rowOfBricks(2000);
+  FitOptions options;
+  options.count = 100;
+  EXPECT_LE(chunksFor(volume, options).size(), 1u);
+  options.maxHostBytes = 20'000'000;
+  EXPECT_LE(chunksFor(volume, options).size(), 1u);
+  options.maxHostBytes = 9'500'000;
+  EXPECT_EQ(chunksFor(volume, options).size(), 2u);
+}
+
+std::size_t sumOf(const std::vector<std::size_t>& numbers) {
+  return std::accumulate(numbers.begin(), numbers.end(), std::size_t{0});
+}
+
+TEST(DivideCount, GivesEqualChunksEqualNumbers) {
+  const std::vector<ChunkNeed> needs(4, {2.0, 10.0, 0, 1000});
+  EXPECT_EQ(dividedCount(100, needs), (std::vector<std::size_t>{25, 25, 25, 25}));
+  EXPECT_EQ(sumOf(dividedCount(101, needs)), 101u);
+}
+
+TEST(DivideCount, LowersTheErrorThatFallsWith45DbPerDoubling) {
+  const std::vector<ChunkNeed> needs{{1.0, 100.0, 0, 100000}, {50.0, 100.0, 0, 100000}};
+  const auto numbers = dividedCount(10000, needs);
+  const auto errorOf = [&](double first, double second) {
+    const double power = 0.45 / std::log10(2.0);
+    return needs[0].error * std::pow(first / 100.0, -power) +
+           needs[1].error * std::pow(second / 100.0, -power);
+  };
+  const double a = double(numbers[0]), b = double(numbers[1]);
+  EXPECT_LT(errorOf(a, b), errorOf(a + 100.0, b - 100.0));
+  EXPECT_LT(errorOf(a, b), errorOf(a - 100.0, b + 100.0));
+}
+
+TEST(DivideCount, KeepsToTheLimits) {
+  const std::vector<ChunkNeed> needs{
+      {1.0, 10.0, 70, 1000}, {1.0, 10.0, 0, 5}, {1.0, 10.0, 0, 1000}};
+  const auto numbers = dividedCount(100, needs);
+  EXPECT_EQ(numbers, (std::vector<std::size_t>{70, 5, 25}));
+}
+
+TEST(DivideCount, GivesNothingToChunksWithoutError) {
+  const std::vector<ChunkNeed> needs{{0.0, 10.0, 0, 1000}, {1.0, 10.0, 0, 1000}};
+  EXPECT_EQ(dividedCount(50, needs), (std::vector<std::size_t>{0, 50}));
+}
+
+TEST(DivideCount, KeepsMoreThanTheCountWhereChunksHaveThem) {
+  const std::vector<ChunkNeed> needs{{1.0, 30.0, 30, 1000}, {1.0, 30.0, 30, 1000}};
+  EXPECT_EQ(dividedCount(50, needs), (std::vector<std::size_t>{30, 30}));
+}
+
+// Parts.
+
+PartEnd someEnd() {
+  PartEnd end;
+  end.fit = stateOf(test::randomEllipsoids(20, 1.0, 3.0));
+  end.fit.adam[3].steps = 17;
+  end.kernel.kappa = 3.5f;
+  end.errors = {1.0, 2.0, 3.0, 4.0};
+  end.pairs = 99;
+  end.end = FitEnd::kTimeUp;
+  end.deviceFull = true;
+  end.secondsSeed = 0.25;
+  return end;
+}
+
+TEST(PartBytes, GiveThePartBack) {
+  const PartEnd end = someEnd(), back = partOf(bytesOf(end));
+  EXPECT_EQ(back.fit.ellipsoids.size(), 20u);
+  EXPECT_EQ(back.fit.ellipsoids[7].center, end.fit.ellipsoids[7].center);
+  EXPECT_EQ(back.fit.adam[3].steps, 17u);
+  EXPECT_EQ(back.kernel, end.kernel);
+  EXPECT_EQ(back.errors.squaredSumActive, 3.0);
+  EXPECT_EQ(back.end, FitEnd::kTimeUp);
+  EXPECT_EQ(bytesOf(back), bytesOf(end));
+}
+
+TEST(PartBytes, AreRefusedWhereTheyAreCutOrLonger) {
+  auto bytes = bytesOf(someEnd());
+  for (const std::size_t size : {std::size_t{0}, std::size_t{5}, bytes.size() - 1})
+    EXPECT_THROW((void)partOf(std::span(bytes).first(size)), BadInput) << size;
+  bytes.push_back({});
+  EXPECT_THROW((void)partOf(bytes), BadInput);
+}
+
+class PartKeys : public testing::Test {
+ protected:
+  /// The key after a change of the scene, the options or the start.
+  struct Inputs {
+    SparseVolume volume = test::tubeVolume();
+    FitOptions options;
+    PartStart start;
+    int halo = 2;
+  };
+  static PartKey keyAfter(const std::function<void(Inputs&)>& change) {
+    Inputs in;
+    in.start.plan.start = stateOf(test::randomEllipsoids(5, 1.0, 2.0));
+    in.start.ghosts = test::randomEllipsoids(3, 1.0, 2.0);
+    change(in);
+    const auto chunks = divideBricks(in.volume, 10);
+    return keyOf(FitScene{in.volume, chunks, scaleOf(in.volume), boxOf(in.volume, std::nullopt),
+                          in.halo, in.options},
+                 in.start);
+  }
+};
+
+TEST_F(PartKeys, ChangeWithAllThatTheResultDependsOn) {
+  const std::vector<std::function<void(Inputs&)>> changes{
+      [](Inputs&) {},
+      [](Inputs& in) { in.volume.brickValues(0)[100] += 0.125f; },
+      [](Inputs& in) { in.options.seed = 2; },
+      [](Inputs& in) { in.options.device.kind = DeviceKind::kCuda; },
+      [](Inputs& in) { in.options.narrowBand = true; },
+      [](Inputs& in) { in.options.bothSigns = true; },
+      [](Inputs& in) { in.halo = 3; },
+      [](Inputs& in) { in.start.chunk = 1; },
+      [](Inputs& in) { in.start.kernel.kappa = 5.0f; },
+      [](Inputs& in) { in.start.plan.iterations = 7; },
+      [](Inputs& in) { in.start.plan.count = 7; },
+      [](Inputs& in) { in.start.plan.to = 0.5; },
+      [](Inputs& in) { in.start.plan.learnKappa = true; },
+      [](Inputs& in) { in.start.plan.psnr = 40.0; },
+      [](Inputs& in) { in.start.plan.start.ellipsoids[2].intensity += 1.0; },
+      [](Inputs& in) { in.start.plan.start.adam[2].m[0] = 1.0f; },
+      [](Inputs& in) { in.start.ghosts[0].center[0] += 1.0; }};
+  std::set<PartKey> keys;
+  for (const auto& change : changes) EXPECT_TRUE(keys.insert(keyAfter(change)).second);
+}
+
+TEST_F(PartKeys, AreTheSameWhereTheResultIs) {
+  const PartKey key = keyAfter([](Inputs&) {});
+  EXPECT_EQ(keyAfter([](Inputs& in) { in.options.device.index = 3; }), key);
+  EXPECT_EQ(keyAfter([](Inputs& in) { in.options.progress = [](const FitProgress&) {}; }), key);
+  EXPECT_EQ(keyAfter([](Inputs& in) { in.start.pairs = 5; }), key);
+}
+
+// Fits in chunks.
 
 constexpr std::uint64_t kChunkVoxels = 2000;
 

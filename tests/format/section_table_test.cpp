@@ -1,20 +1,60 @@
-// Plan: content comes back from every codec that a section may have. Floats are smaller as such than as bytes. Sizes
+// Plan: integers of every length come back, in as many bytes as 7 bits a byte take. Integers of more
+// than 64 bits and truncated ones are refused.
+//
+// Content comes back from every codec that a section may have. Floats are smaller as such than as bytes. Sizes
 // that cannot be are refused before memory is allocated, and so are codecs that a kind of section cannot have.
-
-#include "format/section_table.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <random>
 
 #include "esvr/error.h"
+#include "format/bytes.h"
+#include "format/section_table.h"
 
 namespace esvr::format {
 namespace {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
+
+// Bytes.
+
+TEST(Varint, ComesBackInTheFewestBytes) {
+  for (int bits = 0; bits <= 64; ++bits)
+    for (const std::uint64_t less : {0u, 1u}) {
+      const std::uint64_t value = (bits == 64 ? 0 : std::uint64_t{1} << bits) - less;
+      ByteWriter out;
+      putVarint(out, value);
+      EXPECT_EQ(int(out.size()), std::max((int(std::bit_width(value)) + 6) / 7, 1)) << value;
+      ByteReader in(out.bytes(), "test");
+      EXPECT_EQ(getVarint(in), value);
+      EXPECT_EQ(in.left(), 0u);
+    }
+}
+
+TEST(Varint, RefusesTooManyBitsAndTruncation) {
+  const auto read = [](std::span<const std::uint8_t> bytes) {
+    ByteReader in(std::as_bytes(bytes), "test");
+    return getVarint(in);
+  };
+  std::array<std::uint8_t, 10> bytes;
+  bytes.fill(0xff);
+  bytes.back() = 1;
+  EXPECT_EQ(read(bytes), ~std::uint64_t{0});
+  bytes.back() = 2;
+  EXPECT_THROW((void)read(bytes), BadInput);
+  bytes.back() = 0x81;
+  EXPECT_THROW((void)read(bytes), BadInput);
+  EXPECT_THROW((void)read(std::span(bytes).first(3)), BadInput);
+}
+
+// The table.
+
 using Bytes = std::vector<std::byte>;
 
 Bytes floats(std::size_t count) {

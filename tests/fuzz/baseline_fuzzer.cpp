@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "compare/judge.h"
+#include "compare/check.h"
 #include "esvr/error.h"
 #include "fuzz/input_file.h"
 

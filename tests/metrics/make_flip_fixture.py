@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""FLIP from the paper's equations. As a program, it prints the values that flip_test.cpp compares with.
+"""FLIP from the paper's equations. As a program, it prints the values that image_metrics_test.cpp compares with.
 
 Needs numpy. The equations are those of Andersson et al., "FLIP: A Difference Evaluator for
 Alternating Images", 2020. Every filter is the two-dimensional kernel of the paper; the library uses

@@ -1,10 +1,16 @@
-// Plan: the tests check the results of command lines, the messages for wrong ones, the exit code
-// of every exception, and signals.
-
-#include "programs/command_line.h"
+// Plan: sizes and bounds as users write them are parsed, and other texts are refused. The tests check the results of
+// command lines, the messages for wrong ones, the exit code of every exception, and signals.
+//
+// Help: lines are broken between words, at the last place that keeps to the width; what has columns is kept, and so are
+// empty lines, and a word that is too long stands alone. A man page has all parts of a help text, with the characters
+// escaped that man(7) would take as commands, and the options are named for completion.
+//
+// A table of known cells is printed at several widths. No line is longer than the width, every cell is there, and rows
+// keep their names, whatever is too wide.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <boost/program_options/value_semantic.hpp>
 
 #include <csignal>
 #include <new>
@@ -12,18 +18,94 @@
 #include <thread>
 
 #include "esvr/error.h"
+#include "programs/command_line.h"
+#include "programs/help_text.h"
+#include "programs/messages.h"
+#include "programs/option_values.h"
 #include "programs/run_main.h"
 #include "programs/workers.h"
 
 namespace esvr::cli {
 namespace {
 
+using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::Not;
 using testing::ThrowsMessage;
 using testing::internal::CaptureStderr;
 using testing::internal::CaptureStdout;
 using testing::internal::GetCapturedStderr;
 using testing::internal::GetCapturedStdout;
+
+// Values.
+
+TEST(NumberList, ReadsAsManyNumbersAsAskedFor) {
+  EXPECT_THAT(parseNumbers("eye", "1,-2.5,3e2", 3), ElementsAre(1.0, -2.5, 300.0));
+  EXPECT_THAT(parseNumbers("range", "0,1", 2), ElementsAre(0.0, 1.0));
+}
+
+TEST(NumberList, RefusesAnythingElseAndNamesTheOption) {
+  for (const char* text : {"", "1", "1,2", "1,2,3,4", "1,2,x", "1 2 3", "1,,3", "1,2,nan",
+                           "1,2,inf", "1,2,1e999", "1,2,3 "})
+    EXPECT_THROW((void)parseNumbers("eye", text, 3), UsageError) << text;
+  try {
+    (void)parseNumbers("eye", "1", 3);
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("--eye must be 3 numbers"));
+  }
+}
+
+TEST(ByteSize, knowsUnits) {
+  EXPECT_EQ(parseByteSize("size", "50000"), 50'000u);
+  EXPECT_EQ(parseByteSize("size", "50KB"), 50'000u);
+  EXPECT_EQ(parseByteSize("size", "2.6MB"), 2'600'000u);
+  EXPECT_EQ(parseByteSize("size", "48kib"), 49'152u);
+  EXPECT_EQ(parseByteSize("size", "1GiB"), std::uint64_t{1} << 30);
+  EXPECT_EQ(parseByteSize("size", "7b"), 7u);
+}
+
+TEST(ByteSize, refusesTextThatIsNoSize) {
+  for (const char* text : {"", "KB", "-5KB", "0", "0.4", "5 KB", "5XB", "1e300", "nan", "inf"})
+    EXPECT_THAT([&] { (void)parseByteSize("size", text); },
+                ThrowsMessage<UsageError>(HasSubstr("--size must be a size")))
+        << text;
+}
+
+TEST(DeviceMemory, hasTheUnitsOfOtherSizes) {
+  EXPECT_EQ(parseDeviceMemory("max-vram", "64MB"), 64'000'000u);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "1.5GiB"), std::uint64_t{3} << 29);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "64000000"), 64'000'000u);
+}
+
+TEST(DeviceMemory, isOfGigabytesWithoutAUnitIfThatIsTheOnlyMeaning) {
+  EXPECT_EQ(parseDeviceMemory("max-vram", "4"), 4'000'000'000u);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "0.003"), 3'000'000u);
+  EXPECT_EQ(parseDeviceMemory("max-vram", "1000000"), 1'000'000u);
+}
+
+TEST(DeviceMemory, refusesWhatIsNoMemoryOrTooLittle) {
+  for (const char* text : {"", "x", "-4", "0", "4XB", "nan", "1e300"})
+    EXPECT_THAT([&] { (void)parseDeviceMemory("max-vram", text); },
+                ThrowsMessage<UsageError>(HasSubstr("--max-vram must be a size")))
+        << text;
+  for (const char* text : {"999KB", "0.0001"})
+    EXPECT_THAT([&] { (void)parseDeviceMemory("max-vram", text); },
+                ThrowsMessage<UsageError>(HasSubstr("at least 1MB")))
+        << text;
+}
+
+TEST(ErrorBound, isInUnitsOrAShareOfTheRange) {
+  EXPECT_EQ(parseErrorBound("max-error", "0.25").absolute(8.0), 0.25);
+  EXPECT_EQ(parseErrorBound("max-error", "25%").absolute(8.0), 2.0);
+}
+
+TEST(ErrorBound, isAFiniteNumberAboveZero) {
+  for (const char* text : {"", "%", "0", "-1", "much", "1x", "1%%", "inf", "nan"})
+    EXPECT_THROW((void)parseErrorBound("max-error", text), UsageError) << text;
+}
+
+// Command lines.
 
 CommandLine exampleLine() {
   CommandLine line({.name = "esvr-example",
@@ -237,6 +319,137 @@ TEST(Interrupts, leaveHandlersAsTheyWere) {
   { Interrupts interrupts; }
   sigaction(SIGINT, nullptr, &after);
   EXPECT_EQ(before.sa_handler, after.sa_handler);
+}
+
+// Help.
+
+TEST(WrappedText, BreaksLinesAtTheLastPossibleSpace) {
+  EXPECT_EQ(wrapped("one two three", 7), "one two\nthree");
+  EXPECT_EQ(wrapped("one two three", 6), "one\ntwo\nthree");
+  EXPECT_EQ(wrapped("one two three", 13), "one two three");
+}
+
+TEST(WrappedText, LeavesALongWordWhole) {
+  EXPECT_EQ(wrapped("a incomprehensible b", 5), "a\nincomprehensible\nb");
+}
+
+TEST(WrappedText, KeepsColumnsAndEmptyLines) {
+  EXPECT_EQ(wrapped("one two\n\n  a    long table\nthree four", 5),
+            "one\ntwo\n\n  a    long table\nthree\nfour");
+}
+
+TEST(WrappedText, MayBeEmpty) { EXPECT_EQ(wrapped("", 80), ""); }
+
+namespace po = boost::program_options;
+
+class ManPage : public testing::Test {
+ protected:
+  ManPage() {
+    // clang-format off
+    own_.add_options()
+      ("grid,g", po::value<std::string>()->value_name("NAME"), "write this grid\n.only")
+      ("no-tiles", po::bool_switch(), "write leaves");
+    // clang-format on
+  }
+  po::options_description own_;
+  ProgramText text_{.name = "esvr-example table",
+                    .purpose = "Converts an .esvr file back. It says so.",
+                    .usage = "  esvr-example table IN",
+                    .notes = "'quoted' \\ note\n\n  a  table\nmore",
+                    .examples = ""};
+};
+
+TEST_F(ManPage, hasTheNameAndTheFirstSentence) {
+  const std::string page = manPage(text_, {{"OPTIONS", &own_}});
+  EXPECT_THAT(page, HasSubstr(".TH ESVR-EXAMPLE-TABLE 1 "));
+  EXPECT_THAT(page, HasSubstr("esvr\\-example\\-table \\- Converts an .esvr file back\n"));
+  EXPECT_THAT(page, HasSubstr(".SH SYNOPSIS\n.nf\n  esvr\\-example table IN\n.fi\n"));
+  EXPECT_THAT(page, HasSubstr("It says so."));
+  EXPECT_THAT(page, Not(HasSubstr("EXAMPLES"))) << "an empty section";
+}
+
+TEST_F(ManPage, hasTheOptions) {
+  const std::string page = manPage(text_, {{"OPTIONS", &own_}});
+  EXPECT_THAT(page, HasSubstr(".TP\n\\fB\\-g\\fR, \\fB\\-\\-grid\\fR \\fINAME\\fR\n"));
+  EXPECT_THAT(page, HasSubstr(".TP\n\\fB\\-\\-no\\-tiles\\fR\nwrite leaves\n"));
+}
+
+TEST_F(ManPage, escapesWhatBeginsACommand) {
+  const std::string page = manPage(text_, {{"OPTIONS", &own_}});
+  EXPECT_THAT(page, HasSubstr("write this grid\n\\&.only"));
+  EXPECT_THAT(page, HasSubstr("\\&'quoted' \\e note"));
+}
+
+TEST_F(ManPage, keepsTheColumnsOfLinesThatBeginWithASpace) {
+  const std::string page = manPage(text_, {{"OPTIONS", &own_}});
+  EXPECT_THAT(page, HasSubstr(".SH NOTES\n\\&'quoted'"));
+  EXPECT_THAT(page, HasSubstr("\n.nf\n  a  table\n.fi\n.PP\nmore\n"));
+}
+
+TEST_F(ManPage, namesOptionsForCompletion) {
+  EXPECT_EQ(optionNames({{"OPTIONS", &own_}}), "--grid\n--no-tiles\n");
+}
+
+// Tables and messages.
+
+std::string printed(const Table& table, std::size_t width) {
+  std::ostringstream out;
+  table.print(out, width);
+  return out.str();
+}
+
+std::size_t longestLine(const std::string& text) {
+  std::istringstream stream(text);
+  std::size_t longest = 0;
+  for (std::string line; std::getline(stream, line);) longest = std::max(longest, line.size());
+  return longest;
+}
+
+Table smallTable() {
+  Table table({"grid", "max error", "PSNR active"});
+  table.add({"density", "0.01", "51.54"});
+  return table;
+}
+
+TEST(Table, IsPrintedAsItIsWhereItFits) {
+  const char* const expected =
+      "grid     max error  PSNR active\n"
+      "density       0.01        51.54\n";
+  EXPECT_EQ(printed(smallTable(), 31), expected);
+  std::ostringstream out;
+  smallTable().print(out);
+  EXPECT_EQ(out.str(), expected);
+}
+
+TEST(Table, BreaksItsTitlesWhereItIsTooWide) {
+  EXPECT_EQ(printed(smallTable(), 30),
+            "           max    PSNR\n"
+            "grid     error  active\n"
+            "density   0.01   51.54\n");
+}
+
+TEST(Table, HasSeveralPartsWhereTitlesOfTwoLinesAreTooWide) {
+  EXPECT_EQ(printed(smallTable(), 21),
+            "           max\n"
+            "grid     error\n"
+            "density   0.01\n"
+            "\n"
+            "           PSNR\n"
+            "grid     active\n"
+            "density   51.54\n");
+}
+
+TEST(Table, GivesALongNameALineOfItsOwn) {
+  Table table({"grid", "max error", "PSNR active"});
+  const std::string name(25, 'n'), longest = 'a' + std::string(100, 'b') + 'c';
+  table.add({name, "1", "40.00"});
+  table.add({longest, "2", "41.00"});
+  table.add({"heat", "3", "42.00"});
+  const std::string text = printed(table, 40);
+  EXPECT_LE(longestLine(text), 40u);
+  EXPECT_THAT(text, AllOf(HasSubstr('\n' + name + "\n          1   40.00\n"),
+                          HasSubstr("\nheat      3   42.00\n"), HasSubstr("\nabbb"),
+                          HasSubstr("bbb...bbb"), HasSubstr("bbbc\n"), Not(HasSubstr(longest))));
 }
 
 }  // namespace

@@ -50,6 +50,10 @@ struct BaselineSetting {
 /// \throws UsageError  the text names no setting; the message lists the possible ones
 [[nodiscard]] BaselineSetting parseBaseline(const std::string& text);
 
+/// Half of the smallest difference between an active voxel and the background, by which the voxels of a format without an
+/// active mask are found to be active. Active voxels that equal the background are ignored.
+[[nodiscard]] float activityThreshold(const SparseVolume& volume);
+
 struct BaselineSource {
   const VolumeGrid& grid;
   Box box;                          ///< box over which PSNR is measured; ZFP stores its voxels only
@@ -77,9 +81,8 @@ class BaselineEncoder {
   Encoded encode(const BaselineSetting& setting);
   /// Seconds that the method takes to read the last encoded file into memory.
   [[nodiscard]] double secondsToDecode() const;
-  /// The voxels of the last encoded file. ZFP stores no active mask. A voxel of a ZFP file is
-  /// active if it differs from the background by more than half of the smallest such difference of
-  /// an active voxel of the source.
+  /// The voxels of the last encoded file. ZFP stores no active mask: a voxel of a ZFP file is active if it differs from
+  /// the background by more than the activityThreshold of the source.
   [[nodiscard]] SparseVolume decode() const;
 
   [[nodiscard]] const BaselineSource& source() const;

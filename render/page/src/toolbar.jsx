@@ -1,10 +1,147 @@
-import { useEffect, useState } from "preact/hooks";
-import { HelpDialog } from "./help-dialog.jsx";
-import { SelectField } from "./parts/fields.jsx";
-import { Icon } from "./parts/icon.jsx";
-import { copyText } from "./parts/save-file.js";
-import { SaveDialog } from "./save-dialog.jsx";
-import { applyTheme, kThemes, storedTheme } from "./theme.js";
+/**
+ * The bar above the picture, and the dialogs that it opens.
+ * @typedef {import("./types.js").Backend} Backend
+ * @typedef {import("./types.js").Command} Command
+ * @typedef {import("./types.js").Description} Description
+ * @typedef {import("./types.js").Scene} Scene
+ * @typedef {import("./scene.js").Store} Store
+ */
+import { useEffect, useRef, useState } from "preact/hooks";
+import { applyTheme, copyText, kThemes, saveBlob, saveText, storedTheme } from "./browser.js";
+import { Dialog, Icon, NumberField, SelectField } from "./controls.jsx";
+import { kMostPixels } from "./scene.js";
+
+const kHelp = [
+  ["In the picture", [
+    ["Drag, or one finger", "turn"],
+    ["Shift and drag, right button, or two fingers", "shift"],
+    ["Wheel, or pinch", "zoom"],
+    ["Double click, or 0", "show all of the volume"],
+    ["Arrow keys", "turn"],
+    ["Shift and arrow keys", "shift"],
+    ["+ and −", "zoom"],
+  ]],
+  ["In the opacity curve", [
+    ["Click", "add a point"],
+    ["Drag, or arrow keys", "move a point; with Shift, arrow keys make finer steps"],
+    ["Delete, or right click", "remove a point"],
+    ["Ctrl and wheel", "zoom the axis of values"],
+  ]],
+  ["Everywhere", [
+    ["Ctrl+Z, Ctrl+Shift+Z", "undo and redo a change of settings"],
+    ["Drop a file", "show a ParaView preset (JSON or XML)"],
+    ["The address of the page", "reproduces the view: bookmark it or send it"],
+  ]],
+];
+
+/** @param {{onClose: () => void}} props */
+function HelpDialog({ onClose }) {
+  return (
+    <Dialog title="Mouse, touch and keys" onClose={onClose}>
+      {kHelp.map(([title, rows]) => (
+        <section key={String(title)}>
+          <h3>{title}</h3>
+          <dl class="facts">
+            {/** @type {string[][]} */ (rows).map(([what, does]) => <div key={what}><dt>{what}</dt><dd>{does}</dd></div>)}
+          </dl>
+        </section>
+      ))}
+    </Dialog>
+  );
+}
+
+/** @type {[string, number, number][]} */
+const kSizes = [["1024 × 1024", 1024, 1024], ["1920 × 1080", 1920, 1080], ["3840 × 2160", 3840, 2160]];
+
+/**
+ * The command that makes the picture; asked again when the size changes.
+ * @param {Backend} backend @param {Scene} scene
+ * @param {{width: number, height: number}} size @param {(text: string) => void} onMessage
+ */
+function useCommand(backend, scene, { width, height }, onMessage) {
+  const [command, setCommand] = useState(/** @type {Command | null} */ (null));
+  useEffect(() => {
+    let wanted = true;
+    if (backend.can.has("command"))
+      backend.command({ scene, width, height }).then((c) => wanted && setCommand(c), (e) => onMessage(e.message));
+    return () => void (wanted = false);
+  }, [scene, width, height]);
+  return command;
+}
+
+/** @param {{command: Command, onMessage: (text: string) => void}} props */
+function CommandPart({ command, onMessage }) {
+  const text = useRef(/** @type {any} */ (null));
+  const copy = async () => {
+    if (await copyText(command.text)) return onMessage("The command is on the clipboard.");
+    text.current.select();
+    onMessage("The browser does not allow copying here. The command is selected: press Ctrl+C.");
+  };
+  return (
+    <section>
+      <h3>The same picture by esvr-render</h3>
+      <textarea ref={text} aria-label="Command" readOnly rows={5} value={command.text} />
+      <div class="row">
+        <button type="button" onClick={copy}>Copy command</button>
+        {command.transfer && (
+          <button type="button" onClick={() => saveText(command.transfer ?? "", "transfer.json", "application/json")}>
+            Save transfer.json
+          </button>
+        )}
+      </div>
+      {command.transfer && <p class="hint">The command reads the colors and opacities from transfer.json. Save it into the folder where the command runs.</p>}
+    </section>
+  );
+}
+
+/**
+ * Saves the picture, and shows the command that makes it.
+ * @param {object} props
+ * @param {Backend} props.backend
+ * @param {Scene} props.scene
+ * @param {{width: number, height: number}} props.pixels
+ * @param {string} props.name
+ * @param {() => void} props.onClose
+ * @param {(text: string) => void} props.onMessage
+ */
+function SaveDialog({ backend, scene, pixels, name, onClose, onMessage }) {
+  const [size, setSize] = useState(pixels);
+  const [saving, setSaving] = useState(false);
+  const [message, setMessage] = useState("");
+  const command = useCommand(backend, scene, size, setMessage);
+  const save = async () => {
+    setSaving(true);
+    try {
+      saveBlob(await backend.png({ scene, ...size }), `${name}.png`);
+      setMessage("The picture is saved.");
+    } catch (error) {
+      setMessage(/** @type {Error} */ (error).message);
+    }
+    setSaving(false);
+  };
+  const presets = [["As shown", pixels.width, pixels.height], ...kSizes];
+  return (
+    <Dialog title="Save picture" onClose={onClose}>
+      <fieldset class="point-fields">
+        <legend>Size in pixels</legend>
+        <div class="row">
+          <NumberField label="Width" value={size.width} min={1} max={kMostPixels} step={1} onChange={(width) => setSize({ ...size, width: Math.round(width) })} />
+          <NumberField label="Height" value={size.height} min={1} max={kMostPixels} step={1} onChange={(height) => setSize({ ...size, height: Math.round(height) })} />
+        </div>
+        <div class="row">
+          {presets.map(([text, width, height]) => (
+            <button key={text} type="button" onClick={() => setSize({ width: Number(width), height: Number(height) })}>{text}</button>
+          ))}
+        </div>
+      </fieldset>
+      {backend.can.has("png") && (
+        <button type="button" class="primary" disabled={saving} onClick={save}>{saving ? "Drawing…" : "Save PNG"}</button>
+      )}
+      {command && <CommandPart command={command} onMessage={(text) => (setMessage(text), onMessage(text))} />}
+      <p role="status" class="hint">{message}</p>
+    </Dialog>
+  );
+}
 
 /** Undo and redo by the usual keys, except in fields of text, which have their own. */
 function useUndoKeys(store) {
@@ -37,9 +174,9 @@ function ThemeTool() {
 
 /**
  * @param {object} props
- * @param {import("./types.js").Backend} props.backend
- * @param {import("./types.js").Description} props.description
- * @param {import("./state/store.js").Store} props.store
+ * @param {Backend} props.backend
+ * @param {Description} props.description
+ * @param {Store} props.store
  * @param {{width: number, height: number}} props.pixels
  * @param {(file: number, grid: number) => void} props.onGrid
  * @param {(text: string) => void} props.onMessage

@@ -1,20 +1,108 @@
-import { useEffect, useReducer, useState } from "preact/hooks";
-import { Messages } from "./messages.jsx";
+/**
+ * The page: starts with the scene of the address, and keeps picture, panel and address in step with it.
+ * @typedef {import("./types.js").Backend} Backend
+ * @typedef {import("./types.js").Description} Description
+ * @typedef {import("./types.js").Grid} Grid
+ * @typedef {import("./types.js").Histogram} Histogram
+ * @typedef {import("./types.js").Scene} Scene
+ * @typedef {ReturnType<typeof actionsOf>} Actions  what the controls do with the scene
+ */
+import { render } from "preact";
+import { useEffect, useReducer, useRef, useState } from "preact/hooks";
+import { applyTheme, storedTheme, useSize } from "./browser.js";
+import { compareAt } from "./compare.jsx";
+import { usePainting } from "./painter.js";
 import { Panel } from "./panel.jsx";
-import { usePresets } from "./panels/presets.jsx";
-import { SequenceBar } from "./panels/sequence.jsx";
-import { useSize } from "./parts/use-size.js";
-import { Stage } from "./stage.jsx";
-import { gridOf } from "./state/scene.js";
+import { Messages, SequenceBar, Stage, usePlaying } from "./picture.jsx";
+import { usePresets } from "./presets.jsx";
+import { gridOf, hashOf, kMostPixels, sceneOf, startOf, Store } from "./scene.js";
 import { Toolbar } from "./toolbar.jsx";
-import { actionsOf } from "./use-actions.js";
-import { useAddress } from "./use-address.js";
-import { useConnection } from "./use-connection.js";
-import { usePainting } from "./use-painting.js";
-import { usePlaying } from "./use-playing.js";
-import { useHistogram } from "./use-volume.js";
 
-const kMostPixels = 4096; // a side, as esvr-view allows
+/**
+ * What the controls do with the scene.
+ * @param {object} with_
+ * @param {Backend} with_.backend
+ * @param {Description} with_.description
+ * @param {Store} with_.store
+ * @param {{width: number, height: number}} with_.pixels  of the picture
+ * @param {(text: string) => void} with_.onMessage
+ */
+function actionsOf({ backend, description, store, pixels, onMessage }) {
+  const set = (/** @type {Partial<Scene>} */ change, moving = false) => store.set(change, { moving });
+  const fit = async (view = "default", change = /** @type {Partial<Scene>} */ ({})) => {
+    const { file, grid, frame, camera } = { ...store.scene, ...change };
+    const orthographic = camera.height !== undefined;
+    try {
+      set({ ...change, camera: await backend.fit({ file, grid, frame, ...pixels, view, orthographic }) });
+    } catch (error) {
+      onMessage(/** @type {Error} */ (error).message);
+    }
+  };
+  return {
+    set,
+    fit,
+    setTransfer: (/** @type {Scene["transfer"]} */ transfer, moving = false) => set({ transfer }, moving),
+    chooseGrid: (/** @type {number} */ file, /** @type {number} */ grid) => fit("default", startOf(description, file, grid)),
+    setFrame: (/** @type {number} */ frame, moving = true) =>
+      set({ frame, compare: compareAt(store.scene.compare, description, frame) }, moving),
+  };
+}
+
+/**
+ * Keeps the scene in the address, and takes it from there when the user changes it.
+ * @param {Store} store @param {Description} description
+ * @param {(scene: Omit<Scene, "camera">) => void} onWithoutCamera  for addresses that have none
+ */
+function useAddress(store, description, onWithoutCamera) {
+  const { scene, moving } = store;
+  const latest = useRef(onWithoutCamera);
+  latest.current = onWithoutCamera; // the listener lives as long as the page
+  useEffect(() => {
+    if (!moving) history.replaceState(null, "", hashOf(scene, description));
+  }, [scene, moving]);
+  useEffect(() => {
+    const listen = () => {
+      const { camera, ...found } = sceneOf(location.hash, description);
+      if (camera) store.set({ ...found, camera });
+      else latest.current(found);
+    };
+    addEventListener("hashchange", listen);
+    return () => removeEventListener("hashchange", listen);
+  }, []);
+}
+
+/**
+ * Whether there is a connection, and how many there were before.
+ * @param {Backend} backend
+ */
+function useConnection(backend) {
+  const [state, setState] = useState({ open: true, count: 0 });
+  useEffect(() => {
+    backend.onConnection((open) => setState((old) => ({ open, count: old.count + (open && !old.open ? 1 : 0) })));
+  }, []);
+  return state;
+}
+
+/**
+ * The histogram of a grid; null until it is there.
+ * @param {Backend} backend @param {Grid} grid
+ * @param {Scene} scene @param {boolean} still  the scene does not move
+ * @returns {Histogram | null}
+ */
+function useHistogram(backend, grid, { file, grid: index, frame }, still) {
+  const [histogram, setHistogram] = useState(grid.histogram);
+  const asked = useRef("");
+  useEffect(() => {
+    const place = `${file}/${index}/${frame}`;
+    if (!still || grid.histogram || asked.current === place) return;
+    asked.current = place;
+    const show = (/** @type {Histogram | null} */ found) => asked.current === place && setHistogram(found);
+    // The editor works without one.
+    backend.histogram({ file, grid: index, frame }).then(show, () => show(null));
+  }, [file, index, frame, still]);
+  return grid.histogram ?? histogram;
+}
+
 const kNothing = Object.freeze({ width: 0, height: 0 });
 
 /** Pixels of the screen for an element. @param {{width: number, height: number}} size */
@@ -23,7 +111,7 @@ function pixelsOf({ width, height }) {
   return { width: Math.round(width * ratio), height: Math.round(height * ratio) };
 }
 
-/** Draws again when the store changes. @param {import("./state/store.js").Store} store */
+/** Draws again when the store changes. @param {Store} store */
 function useStore(store) {
   const [, redraw] = useReducer((/** @type {number} */ n) => n + 1, 0);
   useEffect(() => store.subscribe(() => redraw(0)), []);
@@ -42,7 +130,7 @@ function useFirstFit(wanted, width, fit) {
   return ready;
 }
 
-/** @param {string} grid @param {string} file */
+/** Names the window. @param {string} grid @param {string} file */
 function useTitle(grid, file) {
   useEffect(() => {
     document.title = `${grid} of ${file} – ESVR viewer`;
@@ -52,12 +140,12 @@ function useTitle(grid, file) {
 /**
  * The page while a volume is shown.
  * @param {object} props
- * @param {import("./types.js").Backend} props.backend
- * @param {import("./types.js").Description} props.description
- * @param {import("./state/store.js").Store} props.store
+ * @param {Backend} props.backend
+ * @param {Description} props.description
+ * @param {Store} props.store
  * @param {boolean} props.fitFirst  the address has no camera
  */
-export function Viewer({ backend, description, store, fitFirst }) {
+function Viewer({ backend, description, store, fitFirst }) {
   useStore(store);
   const [message, setMessage] = useState("");
   const area = useSize(), pixels = pixelsOf(area.size);
@@ -82,11 +170,51 @@ export function Viewer({ backend, description, store, fitFirst }) {
         <Stage description={description} scene={scene} moving={moving} area={area} actions={actions} painting={painting}>
           <Messages failure={painting.failure} message={message} open={connection.open} onClose={() => setMessage("")} />
         </Stage>
-        {file.frames.length > 1 && backend.can.has("frames") && <SequenceBar {...player} playing={playing} onPlay={setPlaying} frames={file.frames} frame={scene.frame} onFrame={actions.setFrame} />}
+        {file.frames.length > 1 && backend.can.has("frames") && (
+          <SequenceBar
+            {...player} playing={playing} onPlay={setPlaying} frames={file.frames} frame={scene.frame} onFrame={actions.setFrame}
+          />
+        )}
       </main>
       <Panel
         backend={backend} description={description} scene={scene} histogram={histogram} actions={actions} presets={presets} painting={painting}
       />
     </div>
   );
+}
+
+/** The size for which the first camera is fitted: most of the window is the picture. */
+const firstSize = () => ({ width: Math.max(1, innerWidth), height: Math.max(1, innerHeight) });
+
+/** What there is to see, and the scene of the address. @param {Backend} backend */
+async function begin(backend) {
+  const description = await backend.describe();
+  const { camera, ...scene } = sceneOf(location.hash, description);
+  const { file, grid, frame } = scene;
+  const usual = () => backend.fit({ file, grid, frame, ...firstSize(), view: "default", orthographic: false });
+  const store = new Store({ ...scene, camera: camera ?? (await usual()) });
+  return { description, store, fitFirst: camera === undefined };
+}
+
+/** The page from its opening on. @param {{backend: Backend}} props */
+function Page({ backend }) {
+  const [started, setStarted] = useState(/** @type {Awaited<ReturnType<typeof begin>> | null} */ (null));
+  const [error, setError] = useState("");
+  useEffect(() => {
+    begin(backend).then(setStarted, (e) => setError(e.message));
+  }, []);
+  if (started) return <Viewer backend={backend} {...started} />;
+  return (
+    <main class="starting">
+      {error ? <p role="alert">{error}</p> : <p role="status">Opening the volume…</p>}
+    </main>
+  );
+}
+
+/** @param {Backend} backend */
+export function startPage(backend) {
+  const root = /** @type {HTMLElement} */ (document.getElementById("page"));
+  applyTheme(storedTheme());
+  root.replaceChildren();
+  render(<Page backend={backend} />, root);
 }

@@ -1,6 +1,6 @@
 #include "core/cuda/runtime.h"
 #include "fit/cuda/cuda_optimiser.h"
-#include "measure_gradients.h"
+#include "stability.h"
 
 namespace esvr::bench {
 

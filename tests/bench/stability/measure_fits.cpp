@@ -1,4 +1,4 @@
-#include "measure_fits.h"
+#include "stability.h"
 
 #include <algorithm>
 #include <cmath>

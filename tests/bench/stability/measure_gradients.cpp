@@ -1,4 +1,4 @@
-#include "measure_gradients.h"
+#include "stability.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 #include "core/device_choice.h"
-#include "measure_gradients.h"
+#include "stability.h"
 
 namespace esvr::bench {
 

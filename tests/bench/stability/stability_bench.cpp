@@ -17,9 +17,7 @@
 
 #include "esvr/field.h"
 #include "esvr/render.h"
-#include "measure_fits.h"
-#include "measure_gradients.h"
-#include "stability_cases.h"
+#include "stability.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "stability_cases.h"
+#include "stability.h"
 
 #include <algorithm>
 #include <cmath>

@@ -31,6 +31,22 @@ def tilted(spacing=(0.5, 0.75, 2.0), origin=(-6.0, 100.0, 7.0)):
     return matrix
 
 
+def vtk_image(values):
+    """An image of VTK with the matrix tilted(), and its values as an array "T" that it does not hold yet."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    matrix = tilted()
+    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
+    image = vtkImageData()
+    image.SetDimensions(*reversed(values.shape))
+    image.SetSpacing(spacing)
+    image.SetOrigin(matrix[:3, 3])
+    image.SetDirectionMatrix(*(matrix[:3, :3] / spacing).ravel())
+    array = numpy_to_vtk(values.ravel(), deep=True)
+    array.SetName("T")
+    return image, array
+
+
 @dataclasses.dataclass
 class Converted:
     """A grid: values with the axes z, y, x over the box of the image, active voxels, matrix, and the texts that were printed."""

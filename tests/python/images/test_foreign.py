@@ -13,7 +13,7 @@ import esvr
 from esvr.images import image2vdb, vdb2image
 from esvr.images.image import LPS_TO_RAS
 
-from conversions import convert, convert_all, dicom, ramp, run_here, tilted
+from conversions import convert, convert_all, dicom, ramp, run_here, tilted, vtk_image
 
 def same(made, values, matrix=None, atol=1e-5):
     assert made.values.shape == values.shape
@@ -354,17 +354,7 @@ def test_pages_by_pillow(tmp_path):
 @pytest.mark.parametrize("compressor", ["none", "zlib", "lz4", "lzma"])
 def test_vti_by_vtk(tmp_path, mode, compressor):
     xml = pytest.importorskip("vtkmodules.vtkIOXML")
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-    matrix = tilted()
-    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
-    image = vtkImageData()
-    image.SetDimensions(6, 5, 4)
-    image.SetSpacing(spacing)
-    image.SetOrigin(matrix[:3, 3])
-    image.SetDirectionMatrix(*(matrix[:3, :3] / spacing).ravel())
-    array = numpy_to_vtk(ramp("f4").ravel(), deep=True)
-    array.SetName("T")
+    image, array = vtk_image(ramp("f4"))
     image.GetPointData().AddArray(array)  # no array is named as active
     writer = xml.vtkXMLImageDataWriter()
     writer.SetFileName(str(tmp_path / "a.vti"))
@@ -372,7 +362,7 @@ def test_vti_by_vtk(tmp_path, mode, compressor):
     getattr(writer, {"ascii": "SetDataModeToAscii", "binary": "SetDataModeToBinary", "appended": "SetDataModeToAppended"}[mode])()
     writer.SetCompressorType({"none": 0, "zlib": 1, "lz4": 2, "lzma": 3}[compressor])
     writer.Write()
-    same(convert(tmp_path / "a.vti"), ramp(), matrix)
+    same(convert(tmp_path / "a.vti"), ramp(), tilted())
 
 
 def test_pieces_of_vti_by_vtk(tmp_path):

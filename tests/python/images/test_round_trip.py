@@ -12,7 +12,7 @@ import esvr
 from esvr.images import image2vdb, vdb2image
 from esvr.images.image import LPS_TO_RAS
 
-from conversions import convert, dicom, ramp, run_here, tilted
+from conversions import convert, dicom, ramp, run_here, tilted, vtk_image
 
 BOX = np.diag([0.5, 0.75, 2.0, 1.0])
 
@@ -172,18 +172,8 @@ def write_netcdf(path, values):
 
 def write_vti(path, values):
     xml = pytest.importorskip("vtkmodules.vtkIOXML")
-    from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkStringArray
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-    matrix = tilted()
-    spacing = np.linalg.norm(matrix[:3, :3], axis=0)
-    image = vtkImageData()
-    image.SetDimensions(6, 5, 4)
-    image.SetSpacing(spacing)
-    image.SetOrigin(matrix[:3, 3])
-    image.SetDirectionMatrix(*(matrix[:3, :3] / spacing).ravel())
-    array = numpy_to_vtk(values.ravel(), deep=True)
-    array.SetName("T")
+    image, array = vtk_image(values)
     image.GetPointData().SetScalars(array)
     unit = vtkStringArray()
     unit.SetName("length_unit")

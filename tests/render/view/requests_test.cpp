@@ -1,15 +1,21 @@
-// Plan: scenes become the options that esvr-render would have; missing members have its defaults.
-// Transfer functions go to JSON and back unchanged. What is wrong is refused by the name of its
-// member.
-
-#include "render/view/requests.h"
+// Plan: scenes become the options that esvr-render would have; missing members have its defaults. Transfer functions go to
+// JSON and back unchanged. What is wrong is refused by the name of its member.
+//
+// Tokens have the length and the digits of 128 bits and do not repeat; texts are compared with texts that differ in one
+// place. Requests of the page are judged one by one; server_test.cpp sends the same kinds of requests as bytes.
+//
+// For the command line of a picture, functions of built-in parts are found over any range; one changed point is noticed.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
 
+#include <set>
+
 #include "esvr/error.h"
+#include "render/view/command_text.h"
+#include "render/view/request_rules.h"
+#include "render/view/requests.h"
 
 namespace esvr::view {
 namespace {
@@ -17,6 +23,8 @@ namespace {
 using nlohmann::json;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
+
+// Scenes.
 
 // Transfer functions.
 
@@ -141,6 +149,115 @@ TEST(CameraJson, ComesBackAsTheSameCamera) {
   EXPECT_EQ(wish.options.camera.center, camera.center);
   EXPECT_EQ(wish.options.camera.up, camera.up);
   EXPECT_EQ(wish.options.camera.fov, camera.fov);
+}
+
+// Requests of pages.
+
+// The secret.
+
+TEST(Token, Has128RandomBits) {
+  constexpr std::size_t kTokens = 100;
+  std::set<std::string> tokens;
+  std::set<char> digits;
+  while (tokens.size() < kTokens) {
+    const std::string token = randomToken();
+    EXPECT_THAT(token, testing::MatchesRegex("[0-9a-f]{32}"));
+    digits.insert(token.begin(), token.end());
+    ASSERT_TRUE(tokens.insert(token).second);
+  }
+  EXPECT_EQ(digits.size(), 16u);
+}
+
+TEST(Token, IsComparedInAllItsPlaces) {
+  const std::string token = randomToken();
+  EXPECT_TRUE(sameSecret(token, token));
+  for (std::size_t i = 0; i < token.size(); ++i) {
+    std::string other = token;
+    other[i] = char(other[i] ^ 1);
+    EXPECT_FALSE(sameSecret(token, other)) << i;
+  }
+  EXPECT_FALSE(sameSecret(token, token.substr(1)));
+  EXPECT_FALSE(sameSecret("", token));
+}
+
+// Rules.
+
+const Site kSite{"0123456789abcdef", {"render-07"}};
+
+Request requestTo(const std::string& host, const std::string& target = "/0123456789abcdef/") {
+  Request request(http::verb::get, target, 11);
+  request.set(http::field::host, host);
+  return request;
+}
+
+TEST(RequestRules, GiveThePageUnderEveryOwnName) {
+  for (const char* host : {"localhost", "127.0.0.1:80", "[::1]:80", "[::1]", "192.168.1.7:80",
+                           "render-07", "render-07:8080"})
+    EXPECT_EQ(judge(requestTo(host), kSite).target, Target::kPage) << host;
+}
+
+TEST(RequestRules, RefuseOtherNames) {
+  for (const char* host : {"render-08", "render-07.example", "::1]", "[::1", ""}) {
+    const Verdict verdict = judge(requestTo(host), kSite);
+    EXPECT_EQ(verdict.target, Target::kNothing) << host;
+    EXPECT_EQ(verdict.status, http::status::forbidden) << host;
+  }
+}
+
+TEST(RequestRules, TakeTheOriginOfTheHostOnly) {
+  Request request = requestTo("render-07:80");
+  request.set(http::field::origin, "http://render-07:80");
+  EXPECT_EQ(judge(request, kSite).target, Target::kPage);
+  for (const char* origin : {"http://render-07", "https://render-07:80", "http://localhost:80"}) {
+    request.set(http::field::origin, origin);
+    EXPECT_EQ(judge(request, kSite).status, http::status::forbidden) << origin;
+  }
+  request.insert(http::field::origin, "http://render-07:80");
+  EXPECT_EQ(judge(request, kSite).status, http::status::forbidden) << "two origins";
+}
+
+TEST(RequestRules, SendRequestsToTheSocketThatWantOne) {
+  Request request = requestTo("localhost", "/0123456789abcdef/socket");
+  EXPECT_EQ(judge(request, kSite).status, http::status::upgrade_required);
+  request.set(http::field::connection, "upgrade");
+  request.set(http::field::upgrade, "websocket");
+  EXPECT_EQ(judge(request, kSite).target, Target::kSocket);
+}
+
+// Who does not know the token learns nothing but that there is a server.
+TEST(RequestRules, SayNothingMoreWithoutTheToken) {
+  Request request = requestTo("localhost", "/0123456789abcdee/");
+  request.method(http::verb::post);
+  request.set(http::field::content_length, "5");
+  EXPECT_EQ(judge(request, kSite).status, http::status::not_found);
+}
+
+// Command lines.
+
+TEST(LookNames, AreFoundOverAnyRange) {
+  for (const ValueRange range : {ValueRange{0.0f, 1.0f}, ValueRange{-3.5f, 1e6f}}) {
+    const auto names =
+        namesOf(rescaled({builtInColorMap("inferno"), builtInOpacity("linear")}, range));
+    ASSERT_TRUE(names);
+    EXPECT_EQ(names->colors, "inferno");
+    EXPECT_EQ(names->opacity, "linear");
+    EXPECT_EQ(names->range.min, range.min);
+    EXPECT_EQ(names->range.max, range.max);
+  }
+}
+
+TEST(LookNames, AreNoneIfOnePointIsChanged) {
+  TransferFunction f{builtInColorMap("viridis"), builtInOpacity("linear")};
+  ASSERT_TRUE(namesOf(f));
+  TransferFunction other = f;
+  other.opacity.back().opacity -= 0.01;
+  EXPECT_FALSE(namesOf(other));
+  other = f;
+  other.colors.points[1].color.g += 0.01;
+  EXPECT_FALSE(namesOf(other));
+  other = f;
+  other.colors.points.front().x -= 0.01;
+  EXPECT_FALSE(namesOf(other));
 }
 
 }  // namespace

@@ -1,10 +1,12 @@
-// Plan: clients that keep their messages ask for pictures. The picture of a "slow" request has so
-// many samples that its last pass takes longer than all that the other client does meanwhile.
-
-#include "render/view/studio.h"
+// Plan: clients that keep their messages ask for pictures. The picture of a "slow" request has so many samples that its
+// last pass takes longer than all that the other client does meanwhile.
+//
+// The bytes of a message are compared with bytes written by hand; voxels with known values are counted, at the borders of
+// parts of the range too.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -14,17 +16,20 @@
 #include <functional>
 #include <future>
 #include <mutex>
-#include <nlohmann/json.hpp>
+#include <numeric>
 #include <string>
 #include <vector>
 
-#include "render/view/outlet.h"
+#include "render/view/desk.h"
+#include "render/view/studio.h"
 #include "render/view/view_client.h"
 
 namespace esvr::view {
 namespace {
 
 using nlohmann::json;
+
+// The studio.
 
 /// A client that keeps what it is sent.
 class KeptOutlet : public Outlet {
@@ -208,6 +213,65 @@ TEST_F(StudioTest, StopsInTheMiddleOfAPicture) {
   studio_.stop();
   EXPECT_FALSE(hasLast(*one_, 1));
   studio_.draw(one_, request(2));  // has no effect
+}
+
+// The desk.
+
+using namespace std::string_literals;
+
+// Messages.
+
+TEST(BinaryMessage, HasItsHeadBetweenTheLengthAndTheBytes) {
+  EXPECT_EQ(binaryMessage({{"id", 1}}, "\0xyz"s), "\x08\0\0\0{\"id\":1}\0xyz"s);
+}
+
+TEST(BinaryMessage, HasALengthOfSeveralBytes) {
+  const std::string message = binaryMessage({{"x", std::string(0x12345, 'x')}}, "");
+  EXPECT_EQ(message.substr(0, 4), "\x4d\x23\x01\0"s);  // 0x12345 and the 8 bytes {"x":""}
+}
+
+TEST(JsonText, ReplacesBytesThatAreNotUtf8) {
+  EXPECT_EQ(textOf({{"name", "a\xff"}}), "{\"name\":\"a\xef\xbf\xbd\"}");
+}
+
+// Histograms.
+
+/// A brick with these active values.
+SparseVolume volumeOf(const std::vector<float>& values) {
+  BrickInput brick;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    brick.values[i] = values[i];
+    brick.active.set(int(i));
+  }
+  return makeVolume({brick}, 0.0f);
+}
+
+// The width of a part is 1, so that the borders are whole numbers and exact.
+TEST(Histogram, CountsTheActiveValuesOfEachPart) {
+  const auto counts =
+      histogramOf(volumeOf({0.0f, 0.5f, 1.0f, 1.999f, 128.0f, 255.5f, 256.0f}), {0.0f, 256.0f});
+  ASSERT_EQ(counts.size(), 256u);
+  EXPECT_EQ(counts[0], 2u);
+  EXPECT_EQ(counts[1], 2u);
+  EXPECT_EQ(counts[128], 1u);
+  EXPECT_EQ(counts[255], 2u);
+  EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), std::uint64_t{0}), 7u);
+}
+
+TEST(Histogram, CountsValuesOutsideTheRangeAtItsEnds) {
+  const auto counts = histogramOf(volumeOf({-1e30f, 1e30f}), {0.0f, 1.0f});
+  EXPECT_EQ(counts.front(), 1u);
+  EXPECT_EQ(counts.back(), 1u);
+}
+
+TEST(Histogram, CountsAllValuesOnceIfTheyAreEqual) {
+  EXPECT_EQ(histogramOf(volumeOf({3.0f, 3.0f}), {3.0f, 3.0f}).front(), 2u);
+}
+
+TEST(HistogramMessage, NamesItsPlace) {
+  const auto content = nlohmann::json::parse(histogramMessage({2, 1, 7}, {0.5f, 2.0f}, {3, 4}));
+  EXPECT_EQ(content, nlohmann::json::parse(R"({"type":"histogram","file":2,"grid":1,"frame":7,
+      "histogram":{"low":0.5,"high":2.0,"counts":[3,4]}})"));
 }
 
 }  // namespace

@@ -1,13 +1,102 @@
+/**
+ * The editor of the transfer function.
+ * @typedef {import("../types.js").Description} Description
+ * @typedef {import("../types.js").Grid} Grid
+ * @typedef {import("../types.js").Histogram} Histogram
+ * @typedef {import("../types.js").OpacityPoint} OpacityPoint
+ * @typedef {import("../transfer.js").Range} Range
+ * @typedef {import("../types.js").Transfer} Transfer
+ */
 import { useState } from "preact/hooks";
-import { colorMapName, curveName, rangeOf, withColorMap, withCurve, withInvertedColors } from "../look/transfer.js";
-import { SegmentedField, SelectField } from "../parts/fields.jsx";
-import { ColorPoints } from "./color-points.jsx";
-import { MapChooser, titleOf } from "./map-chooser.jsx";
+import { NumberField, SegmentedField, SelectField } from "../controls.jsx";
+import {
+  colorMapName, curveName, halfwayFrom, opacityAt, rangeOf, withAddedPoint, withColorMap, withCurve, withInvertedColors, withoutPoint, withPoint, withRange,
+} from "../transfer.js";
+import { ColorPoints, MapChooser, titleOf } from "./colors.jsx";
 import { Plot } from "./plot.jsx";
-import { PointFields } from "./point-fields.jsx";
-import { RangeFields } from "./range-fields.jsx";
 
-/** @typedef {import("../look/transfer.js").Range} Range */
+/**
+ * The values that the colors and opacities cover.
+ * @param {object} props
+ * @param {Transfer} props.transfer
+ * @param {Range} props.data  range of the active voxels
+ * @param {string} props.unit
+ * @param {(transfer: Transfer) => void} props.onChange
+ */
+function RangeFields({ transfer, data, unit, onChange }) {
+  const [low, high] = rangeOf(transfer);
+  const set = (/** @type {number} */ a, /** @type {number} */ b) => a < b && onChange(withRange(transfer, [a, b]));
+  return (
+    <fieldset class="point-fields">
+      <legend>Range of values{unit && ` in ${unit}`}</legend>
+      <div class="row">
+        <NumberField label="From" value={low} onChange={(v) => set(v, high)} />
+        <NumberField label="to" value={high} onChange={(v) => set(low, v)} />
+        <span class="space" />
+        <button type="button" onClick={() => set(...data)} title="Cover exactly the values of the active voxels">
+          Use all values
+        </button>
+      </div>
+    </fieldset>
+  );
+}
+
+/**
+ * A new point halfway to the next point, or to the one before.
+ * @param {OpacityPoint[]} points @param {number} index
+ */
+function newPoint(points, index) {
+  const value = halfwayFrom(points, index);
+  return withAddedPoint(points, [value, opacityAt(points, value), 0.5, 0]);
+}
+
+/**
+ * The selected point of the opacity curve as numbers.
+ * @param {object} props
+ * @param {OpacityPoint[]} props.points
+ * @param {number} props.index
+ * @param {string} props.unit
+ * @param {(index: number) => void} props.onSelect
+ * @param {(points: OpacityPoint[], moving: boolean) => void} props.onChange
+ */
+function PointFields({ points, index, unit, onSelect, onChange }) {
+  const point = points[index];
+  const set = (/** @type {number} */ member) => (/** @type {number} */ v) =>
+    onChange(withPoint(points, index, /** @type {any} */ (point.with(member, v))), false);
+  const add = () => {
+    const added = newPoint(points, index);
+    onChange(added.points, false);
+    onSelect(added.index);
+  };
+  const remove = () => {
+    onChange(withoutPoint(points, index), false);
+    onSelect(Math.max(0, index - 1));
+  };
+  return (
+    <fieldset class="point-fields">
+      <legend>Opacity point {index + 1} of {points.length}</legend>
+      <div class="row">
+        <button type="button" disabled={index === 0} onClick={() => onSelect(index - 1)}>Previous</button>
+        <button type="button" disabled={index === points.length - 1} onClick={() => onSelect(index + 1)}>Next</button>
+        <span class="space" />
+        <button type="button" onClick={add}>Add</button>
+        <button type="button" disabled={points.length < 2} onClick={remove}>Remove</button>
+      </div>
+      <div class="grid">
+        <NumberField label="Value" value={point[0]} onChange={set(0)} unit={unit} />
+        <NumberField label="Opacity" value={point[1]} min={0} max={1} onChange={set(1)} />
+        <NumberField
+          label="Midpoint" value={point[2]} min={0} max={1} step={0.05} onChange={set(2)}
+          hint="Where the curve is halfway to the next point, as a share of the way"
+        />
+        <NumberField
+          label="Sharpness" value={point[3]} min={0} max={1} step={0.05} onChange={set(3)}
+          hint="0: a straight line to the next point; 1: a step"
+        />
+      </div>
+    </fieldset>
+  );
+}
 
 const kCustom = ""; // the name of what is from no list
 
@@ -57,11 +146,11 @@ function AxisFields({ countScale, opacityScale, zoomed, onCountScale, onOpacityS
 /**
  * Edits a transfer function.
  * @param {object} props
- * @param {import("../types.js").Transfer} props.transfer
- * @param {import("../types.js").Description} props.description
- * @param {import("../types.js").Grid} props.grid
- * @param {import("../types.js").Histogram | null} props.histogram
- * @param {(transfer: import("../types.js").Transfer, moving: boolean) => void} props.onChange
+ * @param {Transfer} props.transfer
+ * @param {Description} props.description
+ * @param {Grid} props.grid
+ * @param {Histogram | null} props.histogram
+ * @param {(transfer: Transfer, moving: boolean) => void} props.onChange
  * @param {any} props.files  controls that open and save presets
  */
 export function Editor({ transfer, description, grid, histogram, onChange, files }) {

@@ -1,6 +1,6 @@
 /**
  * The axes of the editor.
- * @typedef {import("../look/transfer.js").Range} Range
+ * @typedef {import("../transfer.js").Range} Range
  * @typedef {{width: number, height: number}} Size
  * @typedef {"linear" | "fine"} OpacityScale
  * @typedef {ReturnType<typeof scalesOf>} Scales
@@ -16,6 +16,9 @@ const heightOf = (scale, opacity) => (scale === "fine" ? Math.cbrt(opacity) : op
 const opacityOf = (scale, share) => (scale === "fine" ? share ** kPower : share);
 /** @param {number} v */
 const unit = (v) => Math.min(1, Math.max(0, v));
+
+/** Shares of an axis that the arrow keys move a point by; with Shift, steps are finer. */
+export const kCoarse = 0.02, kFine = 0.002;
 
 /** @param {Size} size @param {Range} shown  values at the left and right end @param {OpacityScale} scale */
 export function scalesOf({ width, height }, [low, high], scale) {

@@ -3,8 +3,8 @@
  * @typedef {import("../types.js").Scene} Scene
  * @typedef {import("../types.js").Description} Description
  */
-import { paraViewText } from "../look/paraview.js";
-import { kDefaults } from "../state/scene.js";
+import { paraViewText } from "../paraview.js";
+import { kDefaults } from "../scene.js";
 
 const kTransferFile = "transfer.json";
 

@@ -1,11 +1,17 @@
 /**
  * Draws one file without a server: the decoder gives voxels and tables, and WebGL2 draws them. It runs
  * in a worker, or on the page where workers cannot draw.
- * @typedef {import("../types.js").Triple} Triple
- * @typedef {import("../types.js").Scene} Scene
+ * @typedef {import("../types.js").Camera} Camera
+ * @typedef {import("../types.js").DrawRequest} DrawRequest
+ * @typedef {import("../types.js").Edges} Edges
+ * @typedef {import("../types.js").FitRequest} FitRequest
+ * @typedef {import("./ray-marcher.js").Frame} Frame
  * @typedef {import("../types.js").Grid} Grid
  * @typedef {import("../types.js").PictureHead} PictureHead
- * @typedef {import("./ray-marcher.js").Frame} Frame
+ * @typedef {import("../types.js").Place} Place
+ * @typedef {import("../types.js").Scene} Scene
+ * @typedef {import("../types.js").Transfer} Transfer
+ * @typedef {import("../types.js").Triple} Triple
  * @typedef {{width: number, height: number}} Size
  * @typedef {{name: string, file: Uint8Array, wasm: BufferSource, canvas: OffscreenCanvas | HTMLCanvasElement}} Input
  * @typedef {{level: number, origin: number[], bricks: number[], count: number}} Shape  of an atlas
@@ -14,10 +20,63 @@
  *   scene between two samples
  * @typedef {(head: PictureHead, canvas: OffscreenCanvas | HTMLCanvasElement) => Promise<void> | void} Show
  */
+import { dot, frameOf, inverseOf, kCube, lengthOf, minus, placeOf, plus, times, unitOf } from "../camera.js";
 import { Decoder } from "./decoder.js";
 import { RayMarcher } from "./ray-marcher.js";
-import { difference, scaled, sum } from "./vectors.js";
-import { levelOf, lightOf, placeInLevel, viewOf } from "./view.js";
+
+// The camera as the shader needs it, in the index space of a level of detail (libesvr/render/view.h, brick_march.h).
+// Lengths along rays are those of the camera's space (esvr/camera.h).
+
+/** Voxels of a level along the side of a pixel where it begins, as in the library. */
+const kVoxelsPerPixel = 3;
+const kLastLevel = 7;
+
+/** A place in units of the voxels of a level. @param {Triple} place @param {number} level @returns {Triple} */
+function placeInLevel(place, level) {
+  const side = 2 ** level, offset = 0.5 * (side - 1);
+  return /** @type {Triple} */ (place.map((v) => (v - offset) / side));
+}
+
+/** The plane of the picture: its height at a depth of 1, or in voxels for parallel rays. @param {Camera} camera */
+const planeHeight = ({ fov, height }) => height ?? 2 * Math.tan(((fov ?? 30) * Math.PI) / 360);
+
+/**
+ * The axes of the picture as steps in the index space, and in the camera's space.
+ * @param {Camera} camera @param {{width: number, height: number}} size
+ * @param {number} level @param {Triple} origin  a voxel of the level, to which places are relative
+ * @param {Edges | null} edges  of a voxel
+ */
+export function viewOf(camera, size, level, origin, edges) {
+  const axes = frameOf(camera);
+  const perspective = camera.height === undefined;
+  const height = planeHeight(camera) / (perspective ? 1 : 2 ** level);
+  const width = (height * size.width) / size.height;
+  const rows = inverseOf(edges);
+  const inIndex = (/** @type {Triple} */ v) => /** @type {Triple} */ (rows.map((row) => dot(row, v)));
+  return {
+    eye: minus(placeInLevel(inIndex(camera.eye), level), origin),
+    right: inIndex(axes.right), up: inIndex(axes.up), forward: inIndex(axes.forward),
+    axes, edges: edges ?? kCube, rows,
+    perspective, left: -width / 2, top: height / 2, width, height,
+  };
+}
+
+/**
+ * The level of detail of a picture. The library changes levels along a ray; here, the middle of the
+ * volume decides.
+ * @param {Camera} camera @param {number} height  in pixels @param {Triple} middle  in index space
+ * @param {Edges | null} edges  of a voxel
+ */
+function levelOf(camera, height, middle, edges) {
+  const distance = camera.height === undefined ? lengthOf(minus(placeOf(edges, middle), camera.eye)) : 1;
+  const voxel = Math.max(...(edges ?? kCube).map(lengthOf));
+  const voxels = (planeHeight(camera) * distance) / height / (kVoxelsPerPixel * voxel);
+  return Math.min(kLastLevel, Math.max(0, Math.floor(Math.log2(voxels))));
+}
+
+/** The direction to a light above the left shoulder of someone at the camera's place. */
+const lightOf = (/** @type {ReturnType<typeof viewOf>} */ { axes: { right, up, forward } }) =>
+  unitOf(minus(minus(times(up, 0.6), times(right, 0.5)), forward));
 
 const kBins = 256; // of a histogram
 const kMostTextureBytes = 512 * 2 ** 20;
@@ -48,9 +107,10 @@ function clipOf({ clip, slice }) {
 /** Whether samples of a level cannot miss the clip box. @param {Scene} scene @param {number} level */
 function fits(scene, level) {
   const clip = clipOf(scene), apart = 2 * 2 ** level * Math.max(scene.step, 1);
-  return !clip || difference(clip[1], clip[0]).every((side) => side >= apart);
+  return !clip || minus(clip[1], clip[0]).every((side) => side >= apart);
 }
 
+/** A file, its decoder and the graphics card that draws it. */
 export class Engine {
   #decoder;
   #canvas;
@@ -104,14 +164,14 @@ export class Engine {
     };
   }
 
-  /** @param {import("../types.js").FitRequest} request */
+  /** @param {FitRequest} request */
   fit({ grid, view, orthographic, width, height }) {
     const direction = kDirections[view] ?? null;
     const { box, edges } = this.#gridAt(grid);
     return this.#decoder.fit(box, { direction, orthographic, width, height, edges });
   }
 
-  /** @param {import("../types.js").Place} place */
+  /** @param {Place} place */
   histogram({ grid }) {
     const range = this.#gridAt(grid).range;
     const counts = this.#decoder.histogram(this.#volumeOf(grid), range, kBins);
@@ -120,7 +180,7 @@ export class Engine {
 
   /**
    * Draws a picture, a coarse one before it if it takes long. A later call ends an earlier one.
-   * @param {import("../types.js").DrawRequest} request @param {Show} show
+   * @param {DrawRequest} request @param {Show} show
    */
   async draw({ id, width, height, moving, scene }, show) {
     const number = ++this.#latest, size = { width, height };
@@ -186,13 +246,13 @@ export class Engine {
   #prepare(scene, size) {
     this.#decoder.checkCamera(scene.camera, size);
     const { box, edges } = this.#gridAt(scene.grid);
-    const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, scaled(sum(...box), 0.5), edges) : 0;
+    const wanted = scene.lod === "auto" ? levelOf(scene.camera, size.height, times(plus(...box), 0.5), edges) : 0;
     this.#useVolume(scene.grid, fits(scene, wanted) ? wanted : 0);
     const { level, origin, bricks } = /** @type {Shape} */ (this.#atlas);
     this.#useTables(scene, level);
     const first = /** @type {Triple} */ (origin);
     const view = viewOf(scene.camera, size, level, first, edges);
-    const clip = clipOf(scene)?.map((corner) => difference(placeInLevel(corner, level), first));
+    const clip = clipOf(scene)?.map((corner) => minus(placeInLevel(corner, level), first));
     const high = bricks.map((n) => 8 * n);
     return {
       kind: { mode: scene.mode, classification: scene.classification, shade: scene.shade },
@@ -232,7 +292,7 @@ export class Engine {
    * The table of segments covers the values of the volume and those of the transfer function. Its entries
    * lie so close that a curve between two points of the function has several of them; beyond a limit, the
    * table covers the transfer function alone, which takes longer to draw.
-   * @param {import("../types.js").Transfer} transfer
+   * @param {Transfer} transfer
    */
   #segmentsOf({ colors, opacity }) {
     const places = [...colors, ...opacity].map(([x]) => x).sort((a, b) => a - b);

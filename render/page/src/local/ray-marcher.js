@@ -10,7 +10,7 @@
  *
  * @typedef {object} Frame  What decides the pixels of a picture.
  * @property {Omit<Kind, "inTable">} kind
- * @property {ReturnType<typeof import("./view.js").viewOf>} view
+ * @property {ReturnType<typeof import("./engine.js").viewOf>} view
  * @property {Triple} low @property {Triple} high  the box to draw, relative to the atlas
  * @property {number} step
  * @property {Triple} toLight

@@ -1,5 +1,5 @@
 /** Unpacks the program of the exported page and runs it. */
-import { partOf } from "./packed.js";
+import { partOf } from "./packing.js";
 
 async function start() {
   const script = document.createElement("script");
