@@ -22,9 +22,32 @@
 
 namespace esvr {
 
-// One grid.
+// One grid, and several at the same time.
 
 namespace encode {
+
+void forEachAtOnce(std::size_t count, std::size_t threads,
+                   const std::function<void(std::size_t)>& body) {
+  std::atomic<std::size_t> next{0};
+  const CancelToken* const token = CancelScope::token();
+  const auto work = [&] {
+    const CancelScope scope(token);
+    try {
+      for (std::size_t i; !CancelScope::cancelled() && (i = next++) < count;) body(i);
+    } catch (...) {
+      next = count;
+      throw;
+    }
+  };
+  std::vector<std::future<void>> others;
+  for (std::size_t t = 1; t < std::min(threads, count); ++t)
+    others.push_back(std::async(std::launch::async, work));
+  auto own = std::async(std::launch::deferred, work);
+  own.wait();
+  for (auto& other : others) other.wait();
+  own.get();
+  for (auto& other : others) other.get();
+}
 
 bool GridConverter::isCancelled() const {
   const CancelToken* const token = CancelScope::orToken(fit_.cancel);
@@ -123,19 +146,31 @@ GridConversion GridConverter::make(std::size_t g, const Wish& wish) {
 
 GridConversion GridConverter::makeBeside(std::size_t g) const {
   GridConversion made;
-  FitOptions fit = fit_;
-  fit.progress = options_.convert.fit.progress;
-  const std::function<void()> run = [&] { made = readAndConvert(g, {}, fit); };
-  step({g, false, fit, run});
+  stepBeside(g, [&](const FitOptions& fit) { made = readAndConvert(g, {}, fit); });
   return made;
 }
 
+void GridConverter::stepBeside(std::size_t g,
+                               const std::function<void(const FitOptions&)>& run) const {
+  FitOptions fit = fit_;
+  fit.progress = options_.convert.fit.progress;
+  const std::function<void()> withOptions = [&] { run(fit); };
+  step({g, false, fit, withOptions});
+}
+
+std::size_t GridConverter::mostAtOnce() const {
+  constexpr std::size_t kAtOnce = 4;  // as many frames of a sequence use a GPU
+  using Limit = tbb::global_control;
+  const std::size_t threads = Limit::active_value(Limit::max_allowed_parallelism);
+  return options_.severalAtOnce ? std::min(kAtOnce, threads) : 1;
+}
+
 Conversion GridConverter::convertLike(std::size_t g, const VolumeGrid& source,
-                                      const StoredGrid& expected) const {
+                                      const StoredGrid& expected, const FitOptions& fit) const {
   GridConversion made;
   ConvertOptions options = options_.convert;
   options.keepsPastErrors = false;  // those of another grid are not worth keeping
-  options.fit = fit_;
+  options.fit = fit;
   convert(g, source, {.expected = &expected}, std::move(options), made);
   return std::move(made.conversion);
 }
@@ -360,29 +395,6 @@ class ByteShares {
 
 // Every grid of a file.
 
-/// Calls body(i) for the numbers below `count` on several threads, which begin in their order. None begins
-/// after the token is set or one has thrown; the first exception is thrown again.
-void forEachAtOnce(std::size_t count, int threads, const std::function<void(std::size_t)>& body) {
-  std::atomic<std::size_t> next{0};
-  const CancelToken* const token = CancelScope::token();
-  const auto work = [&] {
-    const CancelScope scope(token);
-    try {
-      for (std::size_t i; !CancelScope::cancelled() && (i = next++) < count;) body(i);
-    } catch (...) {
-      next = count;
-      throw;
-    }
-  };
-  std::vector<std::future<void>> others;
-  for (int t = 1; t < threads; ++t) others.push_back(std::async(std::launch::async, work));
-  auto own = std::async(std::launch::deferred, work);
-  own.wait();
-  for (auto& other : others) other.wait();
-  own.get();
-  for (auto& other : others) other.get();
-}
-
 /// Converts the grids until all are done or the call is cancelled: small ones at the same time, and then one
 /// after the other.
 class GridsConversion {
@@ -407,8 +419,7 @@ class GridsConversion {
   /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
   /// keeps few threads and little of a GPU busy.
   void convertSmall() {
-    constexpr std::uint64_t kMostActive = std::uint64_t{1} << 19;
-    constexpr std::size_t kAtOnce = 4;  // as many frames of a sequence use a GPU
+    constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
     // A single fit takes the time that was asked for, and shows its progress.
     const ConvertOptions& convert = options_.convert;
     if (convert.fit.seconds || std::holds_alternative<FitGoal>(convert.goal)) return;
@@ -416,17 +427,13 @@ class GridsConversion {
     std::vector<std::size_t> small;
     for (std::size_t g = 0; g < made_.size(); ++g)
       if (!twins_.contains(g) && source_.grids[g].activeVoxels <= kMostActive) small.push_back(g);
-    using Limit = tbb::global_control;
-    const std::size_t threads = Limit::active_value(Limit::max_allowed_parallelism);
-    forEachAtOnce(
-        small.size(), int(std::min({kAtOnce, threads, small.size()})), [&](std::size_t i) {
-          try {
-            made_[small[i]] = converter_.makeBeside(small[i]);
-          } catch (
-              const DeviceError&) {  // it is converted again where another device can take over
-          } catch (const Cancelled&) {
-          }
-        });
+    encode::forEachAtOnce(small.size(), converter_.mostAtOnce(), [&](std::size_t i) {
+      try {
+        made_[small[i]] = converter_.makeBeside(small[i]);
+      } catch (const DeviceError&) {  // it is converted again where another device can take over
+      } catch (const Cancelled&) {
+      }
+    });
   }
 
   /// The order in which grids are converted. Those that share a size begin with the one that takes the fewest

@@ -49,7 +49,11 @@ class GridConverter {
   [[nodiscard]] GridConversion makeBeside(std::size_t g) const;
   /// The grid that is made from `source` for another grid that it is expected to be like.
   [[nodiscard]] Conversion convertLike(std::size_t g, const VolumeGrid& source,
-                                       const StoredGrid& expected) const;
+                                       const StoredGrid& expected, const FitOptions& fit) const;
+  /// Runs a step on one of several threads, with options of its own.
+  void stepBeside(std::size_t g, const std::function<void(const FitOptions&)>& run) const;
+  /// Number of small grids that are worked on at the same time.
+  [[nodiscard]] std::size_t mostAtOnce() const;
 
  private:
   /// What all grids of a component's vectors have in common.
@@ -81,6 +85,11 @@ class GridConverter {
   std::vector<VectorScale> scales_;
   std::vector<ActiveSet> sets_;  ///< the active voxels of the vectors of the file
 };
+
+/// Calls body(i) for the numbers below `count` on at most so many threads, which begin in their order. None begins after
+/// the token is set or one has thrown; the first exception is thrown again. (convert_file.cpp)
+void forEachAtOnce(std::size_t count, std::size_t threads,
+                   const std::function<void(std::size_t)>& body);
 
 /// Chooses for each grid of voxels another grid of the file that its voxels refer to, where that takes fewer
 /// bytes, and gives the file the compact layout. If the goal is a PSNR or a preset, the voxels are chosen again

@@ -4,7 +4,9 @@
 #include <variant>
 
 #include "core/add_seconds.h"
+#include "core/parallel.h"
 #include "encode/grids_of_file.h"
+#include "encode/job.h"
 #include "esvr/error.h"
 
 namespace esvr {
@@ -35,8 +37,21 @@ class Sharing {
       : options_(options), converter_(converter), grids_(made.grids), file_(made.file) {}
 
   void run() {
-    for (std::size_t g = 0; g < grids_.size() && !converter_.isCancelled(); ++g)
-      if (mayShare(g)) shareUnlessCancelled(g);
+    const auto chosen = encode::unlessCancelled([&] { return std::optional(references()); });
+    if (!chosen) return;
+    references_ = *chosen;
+    // A grid comes after the one that it refers to, whose voxels may be chosen again.
+    std::vector<std::size_t> round(grids_.size());
+    for (std::size_t g = 0; g < round.size(); ++g)
+      if (const auto& with = references_[g].grid) round[g] = round[*with] + 1;
+    for (std::size_t r = 0; r < round.size(); ++r) {
+      std::vector<std::size_t> small, large;
+      for (std::size_t g = 0; g < round.size(); ++g)
+        if (round[g] == r && mayShare(g)) (isSmall(g) ? small : large).push_back(g);
+      encode::forEachAtOnce(small.size(), converter_.mostAtOnce(),
+                            [&](std::size_t i) { shareUnlessCancelled(small[i]); });
+      for (const std::size_t g : large) shareUnlessCancelled(g);
+    }
   }
 
  private:
@@ -57,6 +72,20 @@ class Sharing {
     return candidates;
   }
 
+  /// True if the coding of a grid keeps few threads busy, and takes little memory.
+  [[nodiscard]] bool isSmall(std::size_t g) const {
+    return file_.grids[g].voxels->codes.size() <= kMostChosenAgain;
+  }
+
+  /// The references of all grids, by their voxels before any of them are chosen again.
+  [[nodiscard]] std::vector<VoxelReference> references() const {
+    std::vector<VoxelReference> found(grids_.size());
+    parallelFor(std::size_t{0}, found.size(), [&](std::size_t g) {
+      if (mayShare(g)) found[g] = chooseReference(file_.grids, g, candidatesFor(g));
+    });
+    return found;
+  }
+
   /// A grid whose sharing is cancelled stands alone.
   void shareUnlessCancelled(std::size_t g) {
     try {
@@ -69,7 +98,7 @@ class Sharing {
   }
 
   void share(std::size_t g) {
-    const VoxelReference reference = chooseReference(file_.grids, g, candidatesFor(g));
+    const VoxelReference& reference = references_[g];
     const bool isAlone = reference == VoxelReference{};
     if (isAlone && file_.grids[g].voxels->codes.size() > kMostAlone) return;
     Shared shared{.bytesWithout = bytesAdded(file_, g)};
@@ -101,9 +130,9 @@ class Sharing {
   /// Chooses voxels that take few bytes with a reference, and takes them if they do.
   void chooseAgain(std::size_t g, const VoxelReference& reference, Shared& shared) {
     const StoredGrid expected = expectedFrom(file_.grids, g, reference);
-    converter_.step(grids_[g].source, [&] {
+    converter_.stepBeside(grids_[g].source, [&](const FitOptions& fit) {
       const VolumeGrid source = converter_.read(grids_[g].source);
-      StoredGrid again = converter_.convertLike(grids_[g].source, source, expected).grid;
+      StoredGrid again = converter_.convertLike(grids_[g].source, source, expected, fit).grid;
       if (!again.voxels) return;
       const StoredGrid before = std::exchange(file_.grids[g], std::move(again));
       file_.grids[g].reference = reference;
@@ -133,6 +162,7 @@ class Sharing {
   GridConverter& converter_;
   std::vector<GridConversion>& grids_;
   EsvrFile& file_;
+  std::vector<VoxelReference> references_;
 };
 
 }  // namespace
