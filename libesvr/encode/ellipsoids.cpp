@@ -6,7 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/add_seconds.h"
 #include "core/parallel.h"
 #include "encode/rate_control.h"
 #include "encode/root_search.h"
@@ -396,12 +395,8 @@ CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions 
 /// box alone, by which it finds the proportions of the steps. A judge's PSNR loses about as many dB, which is measured;
 /// where it misses the goal or exceeds it, all steps are scaled.
 Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
-  if (!job_.judge || !compact_) {
-    Conversion conversion =
-        storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
-    conversion.decisions.bothSigns = bothSigns_;
-    return conversion;
-  }
+  if (!job_.judge || !compact_)
+    return storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
   const double loss =
       std::clamp((attempt.psnr - *goal_.psnr) / rounding_.factor, kLeastLoss, kMostRoundingLoss);
   CompactResult made = compacted(attempt, {.loss = loss});
@@ -422,9 +417,7 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
     made = compactedTo(job_, attempt.grid, attempt.fit, {}, &next);
   }
   if (*reached_ < *goal_.psnr && !attempt.cancelled()) attempt.fit.end = FitEnd::kPsnrMissed;
-  Conversion conversion = conversionOf(std::move(attempt.fit), std::move(*best));
-  conversion.decisions.bothSigns = bothSigns_;
-  return conversion;
+  return conversionOf(std::move(attempt.fit), std::move(*best));
 }
 
 /// The quality that an attempt has after rounding. A grid that is seen gets the mass of its source.
@@ -530,18 +523,14 @@ double EllipsoidSearch::qualityForBytes(const Attempt& attempt) const {
 void EllipsoidSearch::decideSigns() {
   FitOptions& fit = options_.fit;
   if (draft_->cancelled() || fit.bothSigns || fit.narrowBand || !saturates_) return;
-  double seconds = 0.0;
-  auto found = addSeconds(seconds, [&] {
-    return unlessCancelled([&]() -> std::optional<Attempt> {
-      fit.bothSigns = true;
-      Attempt both = shortFit(double(draft_->asked));
-      if (qualityForBytes(both) < qualityForBytes(*draft_) + kTuning.signsGain) return std::nullopt;
-      return both;
-    });
+  auto found = unlessCancelled([&]() -> std::optional<Attempt> {
+    fit.bothSigns = true;
+    Attempt both = shortFit(double(draft_->asked));
+    if (qualityForBytes(both) < qualityForBytes(*draft_) + kTuning.signsGain) return std::nullopt;
+    return both;
   });
   fit.bothSigns = found.has_value();
   if (found) draft_ = std::move(found), drafted_ = {pointOf(*draft_)};
-  bothSigns_ = {.tried = true, .used = *fit.bothSigns, .seconds = seconds};
   if (isCancelled(job_)) draft_->fit.end = FitEnd::kCancelled;
 }
 
@@ -699,7 +688,6 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
   double quality = 0.0, each = price_;
   const auto take = [&](Attempt attempt, CompactResult now) {
     best = conversionOf(std::move(attempt.fit), std::move(now));
-    best->decisions.bothSigns = bothSigns_;
   };
   for (int fits = 0; fits < (best ? plan_.wholeFits : kFitsUntilOneIsSmall); ++fits) {
     if (draft_->cancelled() || besides_ >= *goal_.bytes) break;

@@ -136,7 +136,6 @@ class EllipsoidSearch {
   bool slopeIsKnown_ = false;  ///< from two short fits
   bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below Goal::below
   std::uint64_t maxCount_;
-  Decision bothSigns_;
   std::optional<Attempt> draft_;           ///< the last short fit
   std::vector<FitPoint> drafted_;          ///< all of them that are like it
   double price_ = kTuning.usualBytesEach;  ///< expected bytes of an ellipsoid

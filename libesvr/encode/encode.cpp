@@ -42,7 +42,6 @@ Conversion asConversion(VoxelCandidate voxels, const std::optional<Candidate>& e
   conversion.choice = ChoiceRecord{figuresOf(voxels), ellipsoids};
   conversion.grid = std::move(voxels.grid);
   conversion.fit.end = end;
-  conversion.decisions.plateau = voxels.plateau;
   return conversion;
 }
 
@@ -223,8 +222,6 @@ class Choice {
   Conversion ellipsoidsInsteadOf(const std::optional<Candidate>& voxels) {
     conversion_->choice = ChoiceRecord{voxels, figures_};
     if (conversion_->choice->voxels) conversion_->choice->voxels->seconds = voxels_->seconds();
-    conversion_->decisions.plateau = voxels_->plateau();
-    conversion_->decisions.plateau.used = false;
     return std::move(*conversion_);
   }
 

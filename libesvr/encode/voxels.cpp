@@ -231,8 +231,7 @@ VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
       share_(double(tryOn_.brickCount()) / double(job.input.source.brickCount())),
       range_(spanOf(job.input.source).length()),
       besides_(bytesBeside(job)) {
-  decision_.seconds = secondsOf([&] { plateau_ = plateauOf(tryOn_); });
-  seconds_ += *decision_.seconds;
+  seconds_ += secondsOf([&] { plateau_ = plateauOf(tryOn_); });
   if (!seesPictures(job)) return;
   mass_ = job.judge->mass();
   sampleMass_ = job.judge->massOf(sample_);
@@ -367,8 +366,8 @@ void VoxelSearch::tryForPsnr() {
   const Setting first{psnr / kDbPerOctave - 1.0};
   std::optional<Tried> with;
   if (hasPlateau() && !job_.options.previous && range_ > 0.0) {
-    *decision_.seconds += secondsOf([&] { with = fewestLevels(psnr, first); });
-    decision_.tried = true;
+    with = fewestLevels(psnr, first);
+    plateauChoice_.tried = true;
   }
   const bool isFine = with && with->setting.levels >= kFineLevels;
   if (!isFine && range_ > 0.0)
@@ -399,16 +398,16 @@ bool VoxelSearch::exactIsBest() {
          std::max(kTuning.exactFactor * least, least + double(kTuning.exactBytes));
 }
 
-/// Takes the lattice with the plateau where it is better, and records the decision.
+/// Takes the lattice with the plateau where it is better.
 void VoxelSearch::decidePlateau(std::optional<Tried> with) {
-  if (!decision_.tried) return;
-  if (best_) decision_.bytesWithout = best_->bytes;
-  if (with) decision_.bytesWith = with->bytes;
+  if (!plateauChoice_.tried) return;
+  if (best_) plateauChoice_.bytesWithout = best_->bytes;
+  if (with) plateauChoice_.bytesWith = with->bytes;
   const auto better = [&](const Tried& a, const Tried& b) {
     return goal_.psnr ? a.bytes < b.bytes : a.psnr > b.psnr;
   };
-  decision_.used = with && (!best_ || better(*with, *best_));
-  if (decision_.used) best_ = std::move(with);
+  plateauChoice_.used = with && (!best_ || better(*with, *best_));
+  if (plateauChoice_.used) best_ = std::move(with);
 }
 
 // ---- A size
@@ -477,15 +476,11 @@ void VoxelSearch::tryForSize() {
   const Setting first{2.0 + 8.0 * double(*goal_.bytes) / active, price()};
   best_ = fullest(tryOn_, first);
   if (!hasPlateau()) return;
-  std::optional<Tried> with;
-  decision_.tried = true;
-  *decision_.seconds += secondsOf([&] {
-    Setting setting = best_ ? best_->setting : first;
-    setting.levels = 1.0;
-    with = best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
-                 : fullest(tryOn_, setting);
-  });
-  decidePlateau(std::move(with));
+  plateauChoice_.tried = true;
+  Setting setting = best_ ? best_->setting : first;
+  setting.levels = 1.0;
+  decidePlateau(best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
+                      : fullest(tryOn_, setting));
 }
 
 // ---- The result
@@ -615,8 +610,8 @@ std::optional<VoxelCandidate> VoxelSearch::run() {
   });
   if (!found && goal_.psnr) throw Cancelled();
   if (found && goal_.bytes && found->bytes > *goal_.bytes) found.reset();
-  if (found && decision_.used) decision_.bytesWith = found->bytes;
-  if (found) found->seconds = seconds_, found->plateau = decision_;
+  if (found && plateauChoice_.used) plateauChoice_.bytesWith = found->bytes;
+  if (found) found->seconds = seconds_, found->plateau = plateauChoice_;
   return found;
 }
 

@@ -10,13 +10,20 @@
 
 namespace esvr::encode {
 
+/// Whether a lattice that contains the most frequent value, the plateau, was tried and is used, and the bytes of the best
+/// grids with and without it, if they were measured.
+struct PlateauChoice {
+  bool tried = false, used = false;
+  std::optional<std::uint64_t> bytesWith{}, bytesWithout{};
+};
+
 /// A grid that holds voxels.
 struct VoxelCandidate {
   StoredGrid grid;
   std::uint64_t bytes = 0;  ///< bytes that it adds to the file or frame
   double psnr = 0.0;        ///< quality, dB; +inf if the voxels are exact
   double seconds = 0.0;     ///< wall-clock seconds of the whole search
-  Decision plateau;         ///< whether the lattice contains the most frequent value
+  PlateauChoice plateau;
 };
 
 /// The most frequent value of the active voxels besides 0 and the background, which are exact anyway,
@@ -56,8 +63,7 @@ class VoxelSearch {
   /// \throws Cancelled  no voxels were found before the cancellation
   [[nodiscard]] std::optional<VoxelCandidate> run();
 
-  /// The decision about the plateau, and the wall-clock seconds of all that was done so far.
-  [[nodiscard]] const Decision& plateau() const { return decision_; }
+  /// The wall-clock seconds of all that was done so far.
   [[nodiscard]] double seconds() const { return seconds_; }
 
  private:
@@ -125,7 +131,7 @@ class VoxelSearch {
   std::optional<Tried> best_;           ///< the best setting on the sample
   std::optional<std::uint64_t> exact_;  ///< bytes of exact voxels, if they may be the better ones
   std::optional<Candidate> tooLarge_;
-  Decision decision_;
+  PlateauChoice plateauChoice_;
   double seconds_ = 0.0;
 };
 

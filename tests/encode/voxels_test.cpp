@@ -127,8 +127,6 @@ TEST_F(VoxelSearch, RecordsThatThereIsNoPlateau) {
   const auto found = forPsnr(40.0);
   EXPECT_FALSE(found.plateau.tried || found.plateau.used);
   EXPECT_FALSE(found.plateau.bytesWith);
-  EXPECT_TRUE(found.plateau.seconds) << "the voxels were counted";
-  EXPECT_GE(found.seconds, *found.plateau.seconds);
 }
 
 TEST_F(VoxelSearch, StoresOneValueInFewBytes) {

@@ -208,32 +208,11 @@ struct ChoiceRecord {
   std::optional<Candidate> ellipsoids;  ///< nothing if they cannot reach the goal or were not tried
 };
 
-/// What a conversion found out about a means of making a grid better or smaller. Figures that were
-/// not measured are missing. If the goal is a size, both grids fill it, and the one with the higher
-/// PSNR is stored.
-struct Decision {
-  bool tried = false;                           ///< grids with it were made to be compared
-  bool used = false;                            ///< the stored grid has it
-  std::optional<std::uint64_t> bytesWith{};     ///< bytesAdded of the best grid with it
-  std::optional<std::uint64_t> bytesWithout{};  ///< bytesAdded of the best grid without it
-  std::optional<double> seconds{};              ///< wall-clock seconds that deciding took
-};
-
-/// The decisions of a conversion besides that between voxels and ellipsoids (ChoiceRecord).
-struct DecisionRecord {
-  /// Intensities of both signs although all values have one sign. The clamp makes this possible: it
-  /// removes what the sum has beyond the range of the values.
-  Decision bothSigns;
-  /// A quantisation lattice of voxels that contains the most frequent value, the plateau.
-  Decision plateau;
-};
-
 struct Conversion {
   StoredGrid grid;                       ///< the grid that a reader of the file gets
   FitResult fit;                         ///< its field is empty; unused if voxels are stored
   std::optional<CompactRecord> compact;  ///< set if ellipsoids are stored as kCompact
   std::optional<ChoiceRecord> choice;    ///< set if voxels were considered for the goal
-  DecisionRecord decisions;
   /// True if the goal was measured by what is seen (Measure::kAuto, PictureGoal). The figures of candidates
   /// in dB then are those of this measure.
   bool byPictures = false;
