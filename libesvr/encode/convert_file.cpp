@@ -580,6 +580,7 @@ ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
     assemble(source, made);
   }
   encode::shareGrids(options, converter, made);
+  made.interrupted = converter.isCancelled();
   return made;
 }
 

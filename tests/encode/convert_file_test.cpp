@@ -363,6 +363,24 @@ TEST(ConvertGrids, LeavesOutIncompleteVectorsWhenItIsCancelled) {
   EXPECT_TRUE(made.file.vectors.empty());
 }
 
+TEST(ConvertGrids, SaysThatItWasCancelledWhileGridsShared) {
+  FileOptions options = fileOptions(PresetGoal{});
+  options.severalAtOnce = false;
+  CancelToken token;
+  options.convert.fit.cancel = &token;
+  std::size_t converted = 0;
+  options.onConverted = [&](const VolumeGrid&, const GridConversion&) { ++converted; };
+  options.onStep = [&](const GridStep& step) {
+    if (converted == 2) token.cancel();  // voxels are chosen again, for a reference
+    step.run();
+  };
+  const FileSource file = fileOf({{"density", softBall({}, 1.0f)}, {"heat", softBall({}, 40.0f)}});
+  const ConvertedFile made = convertGrids(file, options);
+  EXPECT_TRUE(token.cancelled()) << "no voxels were chosen again";
+  EXPECT_TRUE(made.interrupted);
+  EXPECT_THAT(decodeEsvr(encodeEsvr(made.file), "file").grids, SizeIs(2));
+}
+
 // Steps, and frames.
 
 TEST(ConvertGrids, RunsAStepAgainOnAnotherDevice) {
