@@ -20,7 +20,7 @@ constexpr std::size_t kMostShared = std::size_t{1} << 25;
 /// long as coding them.
 constexpr std::size_t kMostChosenAgain = std::size_t{1} << 21;
 /// Largest number of voxels in bricks for each byte that they take. Where they take fewer bytes,
-/// choosing them again saves little.
+/// choosing them again saves little: nothing of the shadow of gas_0004 (328 voxels a byte) in 2.4 CPU seconds.
 constexpr std::size_t kMostVoxelsPerByte = 256;
 
 /// Largest number of voxels in bricks of a grid that is coded in the way of related grids where no other grid is like it.
