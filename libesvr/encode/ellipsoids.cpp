@@ -214,9 +214,11 @@ constexpr double kGrownFrom = 0.9;
 /// that are made until one is that near.
 constexpr double kNear = kMostGrowth * kGrownFrom;
 constexpr int kMostDrafts = 3;
-/// Largest number of ellipsoids of the first of them, and of one that scouts before them. Where the first one is farther
-/// from the PSNR than kFar times its number of ellipsoids, one with as many times fewer shows the slope.
-constexpr double kMostOfFirstDraft = 6000.0, kMostOfScout = 1000.0, kFar = 4.0;
+/// Largest number of ellipsoids of the first of them. Where it is farther from the PSNR than kFar times its number of
+/// ellipsoids, one with as many times fewer shows the slope.
+constexpr double kMostOfFirstDraft = 6000.0, kFar = 4.0;
+/// Largest number of ellipsoids of a fit that scouts before them, in volumes of up to 20,000 and from 40,000 bricks on.
+constexpr double kMostOfScout = 1000.0, kMostOfLargeScout = 2000.0, kBricksOfScout = 20.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
 constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
@@ -282,7 +284,7 @@ EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
       saturates_(saturates(job.input.source)),
       rounding_(isToned(job) ? kTuning.tonedRounding : kTuning.rounding),
       margin_(compact_ ? compactMargin(rounding_.usualLoss * rounding_.factor) : kFloat32Margin),
-      slope_(isToned(job_) ? kTuning.tonedDbPerDoubling : kDbPerDoubling),
+      slope_(isToned(job_) && plan_.improves ? kTuning.tonedDbPerDoubling : kDbPerDoubling),
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
@@ -333,7 +335,9 @@ double firstCount(const Job& job) {
 }  // namespace
 
 Attempt scoutingFit(const Job& job) {
-  const double count = std::min(firstCount(job), kMostOfScout);
+  const double most = std::clamp(double(job.input.source.brickCount()) / kBricksOfScout,
+                                 kMostOfScout, kMostOfLargeScout);
+  const double count = std::min(firstCount(job), most);
   return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
 }
 

@@ -34,7 +34,7 @@ struct Tuning {
   /// growth of the PSNR by twice the ellipsoids (aneurism has 6.7 dB).
   double uncertainty = 1.0, steepestDbPerDoubling = 7.0;
   /// Usual growth of what is seen of tones by twice the ellipsoids, dB: smoke1 has 2.9 to 3.4, the plume of 256 3.4,
-  /// hydrogen_atom 2.3 to 4.2. Of values, it is kDbPerDoubling.
+  /// hydrogen_atom 2.3 to 4.2. Of values, and of the short fits of large volumes, it is kDbPerDoubling (plume of 640: 5.4).
   double tonedDbPerDoubling = 3.0;
   /// dB by which a fit with both signs must be better to be taken (Lab, "Signs").
   double signsGain = 0.25;
