@@ -159,7 +159,8 @@ void GridConverter::stepBeside(std::size_t g,
 }
 
 std::size_t GridConverter::mostAtOnce() const {
-  constexpr std::size_t kAtOnce = 4;  // as many frames of a sequence use a GPU
+  // A GPU then has as many grids at a time as it has frames of a sequence.
+  constexpr std::size_t kAtOnce = 4;
   using Limit = tbb::global_control;
   const std::size_t threads = Limit::active_value(Limit::max_allowed_parallelism);
   return options_.severalAtOnce ? std::min(kAtOnce, threads) : 1;
@@ -419,6 +420,7 @@ class GridsConversion {
   /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
   /// keeps few threads and little of a GPU busy.
   void convertSmall() {
+    // The voxels of such a grid are coded in one or two blocks, each on one thread.
     constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
     // A single fit takes the time that was asked for, and shows its progress.
     const ConvertOptions& convert = options_.convert;

@@ -210,8 +210,8 @@ constexpr double kLeastGrowth = 0.85, kMostGrowth = 1.8;
 /// A continued fit of fewer ellipsoids starts from this share of them, and a short fit has this share
 /// of the expected number. New ones then find the places that miss those that were dropped.
 constexpr double kGrownFrom = 0.9;
-/// Factor of the number up to which a short fit is extrapolated, so that a whole one can continue it, and the short fits
-/// that are made until one is that near.
+/// A short fit is extrapolated up to this factor of its number, so that a whole one can continue it. At most so many short
+/// fits are made to come that near.
 constexpr double kNear = kMostGrowth * kGrownFrom;
 constexpr int kMostDrafts = 3;
 /// Largest number of ellipsoids of the first of them. Where it is farther from the PSNR than kFar times its number of
