@@ -334,18 +334,14 @@ double firstCount(const Job& job) {
 
 }  // namespace
 
-Attempt scoutingFit(const Job& job) {
-  const double most = std::clamp(double(job.input.source.brickCount()) / kBricksOfScout,
-                                 kMostOfScout, kMostOfLargeScout);
-  const double count = std::min(firstCount(job), most);
+Attempt shortFitOf(const Job& job, double count) {
   return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
 }
 
-/// The job's scout, if it has about so many ellipsoids, or a new fit.
-Attempt EllipsoidSearch::firstShortFit(double count) const {
-  const Attempt* scout = job_.scout;
-  const bool fits = scout && std::abs(std::log(countOf(*scout) / count)) <= std::log(kNear);
-  return fits ? *scout : shortFit(count);
+double scoutCount(const Job& job) {
+  const double most = std::clamp(double(job.input.source.brickCount()) / kBricksOfScout,
+                                 kMostOfScout, kMostOfLargeScout);
+  return std::min(firstCount(job), most);
 }
 
 Attempt EllipsoidSearch::shortFit(double count) const {
@@ -465,6 +461,10 @@ double EllipsoidSearch::nextCount() const {
     const FitPoint last = pointOf(attempts_.back());
     const double more = last.psnr - psnrFor(fits, last.count, slope_);
     above = std::isfinite(more) ? std::max(more, 0.0) : 0.0;
+    // By how much differs with the number of ellipsoids.
+    std::erase_if(fits, [&](const FitPoint& fit) {
+      return std::abs(std::log2(fit.count / last.count)) > std::log2(kNear);
+    });
   }
   for (FitPoint& fit : fits) fit.psnr += above;
   for (const Attempt& a : attempts_) fits.push_back(pointOf(a));
@@ -483,13 +483,22 @@ void EllipsoidSearch::learnFrom(const Attempt& other) {
                       2.0 * kTuning.steepestDbPerDoubling);
 }
 
+/// The number of ellipsoids of the first short fit for a PSNR.
+double EllipsoidSearch::firstCountForPsnr() const {
+  if (job_.scout) {
+    const double count = countFor({*job_.scout}, aim() - behind(), slope_),
+                 near = job_.scout->count;
+    return kGrownFrom * std::clamp(count, near / kMaxGrowth, near * kMaxGrowth);
+  }
+  const double guess = firstCount(job_);
+  // Where ellipsoids win, they usually take about half of the bytes.
+  return goal_.below ? std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach) : guess;
+}
+
 /// A short fit whose number of ellipsoids is near the one that the PSNR needs. The first guess can be
 /// far from it, where signs and prices differ.
 void EllipsoidSearch::draftNearPsnr() {
-  double guess = firstCount(job_);
-  // Where ellipsoids win, they usually take about half of the bytes.
-  if (goal_.below) guess = std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach);
-  draft_ = job_.scout ? *job_.scout : shortFit(capped(guess));
+  draft_ = shortFit(capped(firstCountForPsnr()));
   drafted_ = {pointOf(*draft_)};
   const auto next = [&] { return capped(kGrownFrom * nextCount()); };
   const auto another = [&](double count) {
@@ -567,7 +576,7 @@ void EllipsoidSearch::draft(const CancelToken* cancel) {
   if (goal_.psnr)
     draftNearPsnr();
   else
-    draft_ = firstShortFit(firstCount(job_));
+    draft_ = shortFit(firstCount(job_));
   if (!goal_.below || mayStayBelow(*goal_.below)) decideSigns();
   forecast();
   options_.fit.cancel = own;

@@ -23,13 +23,12 @@ struct Attempt {
   [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
 };
 
-/// The quality, dB, of a fit for which a number of ellipsoids was wanted.
-struct FitPoint {
-  double count = 0.0, psnr = 0.0;
-};
+/// A short fit, by itself.
+/// \param count  wanted number of ellipsoids
+[[nodiscard]] Attempt shortFitOf(const Job& job, double count);
 
-/// A short fit of few ellipsoids, which shows what suits a job.
-[[nodiscard]] Attempt scoutingFit(const Job& job);
+/// The number of ellipsoids of a short fit that shows what suits a job, before anything is known.
+[[nodiscard]] double scoutCount(const Job& job);
 
 /// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
 /// are found by value, and the end of the fit becomes kCancelled.
@@ -102,7 +101,7 @@ class EllipsoidSearch {
 
  private:
   [[nodiscard]] Attempt shortFit(double count) const;
-  [[nodiscard]] Attempt firstShortFit(double count) const;
+  [[nodiscard]] double firstCountForPsnr() const;
   [[nodiscard]] Attempt wholeFit(double count) const;
   [[nodiscard]] const Attempt* startFor(double count) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;

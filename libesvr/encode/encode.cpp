@@ -619,7 +619,7 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
       size->bytes -= std::min<std::uint64_t>(size->bytes, sizeof tone.scale);
   }
   const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
-  const Job job{input, options, &judge, choice.scout ? &*choice.scout : nullptr};
+  const Job job{input, options, &judge, choice.scout};
   Conversion conversion = std::visit(Converter(job), options.goal);
   conversion.smallerExactBytes =
       unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });

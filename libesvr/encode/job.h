@@ -10,16 +10,20 @@
 
 namespace esvr::encode {
 
-struct Attempt;
 class Judge;
+
+/// The quality, dB, of a fit for which a number of ellipsoids was wanted.
+struct FitPoint {
+  double count = 0.0, psnr = 0.0;
+};
 
 /// The input and the options of a conversion, which a job does not own.
 struct Job {
   const ConvertInput& input;  ///< has the tones of the values if there is a tone curve
   const ConvertOptions& options;
   const Judge* judge = nullptr;  ///< null: quality is the PSNR over the box
-  /// A short fit that was made with this input and judge, null if none was
-  const Attempt* scout = nullptr;
+  /// What the fit showed by which the tone curve was chosen. The number of ellipsoids of the first short fit follows from it.
+  std::optional<FitPoint> scout{};
 };
 
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.

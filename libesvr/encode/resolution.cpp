@@ -409,6 +409,23 @@ VolumeGrid decodeAtResolution(const StoredGrid& grid, double factor, const Decod
   return made;
 }
 
+SparseVolume coarsened(const SparseVolume& volume, int factor) {
+  requireFactor(factor);
+  std::vector<Coord> corners;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
+  const std::vector<Coord> coarse = coarseBricks(corners, factor);
+  std::vector<BrickInput> made;
+  for (std::size_t first = 0; first < coarse.size(); first += kCoarseAtOnce) {
+    const std::size_t last = std::min(first + kCoarseAtOnce, coarse.size());
+    Averager averager(
+        {coarse.begin() + std::ptrdiff_t(first), coarse.begin() + std::ptrdiff_t(last)},
+        {.factor = double(factor), .background = volume.background});
+    averager.add(volume);
+    append(std::move(averager).finish(), made);
+  }
+  return makeVolume(std::move(made), volume.background);
+}
+
 VectorGrid decodeVectorAtResolution(const std::string& name, StoredComponents components,
                                     double factor, const DecodeOptions& options) {
   VectorGrid vectors;

@@ -57,10 +57,10 @@ class Judge {
   std::optional<metrics::TransmittanceReference> pictures_;
 };
 
-/// A tone curve, and the short fit with which it was found to be better than another one, if there was one.
+/// A tone curve, and what the fit showed with which it was found to be better than another one, if there was one.
 struct ToneChoice {
   ToneCurve tone;
-  std::optional<Attempt> scout{};
+  std::optional<FitPoint> scout{};
 };
 
 /// The tone curve of a conversion: that of the options, that of the previous frame, or the one with which

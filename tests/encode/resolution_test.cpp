@@ -150,6 +150,16 @@ TEST(Coarser, EllipsoidsAreAveragesOfTheirVoxels) {
     }
 }
 
+TEST(Coarser, VolumesBecomeWhatTheirGridsDo) {
+  const SparseVolume volume = soft(0.0f, 0.25f);
+  const SparseVolume expected = decodeAtResolution(exactOf(volume), 2.0).volume;
+  const SparseVolume coarse = coarsened(volume, 2);
+  EXPECT_EQ(coarse.origin, expected.origin);
+  EXPECT_EQ(coarse.bricks, expected.bricks);
+  EXPECT_EQ(coarse.values, expected.values);
+  EXPECT_EQ(coarse.active, expected.active);
+}
+
 TEST(Coarser, LeavesMissingValuesOut) {
   SparseVolume fine = soft();
   for (std::size_t n = 0; n < fine.values.size(); n += 3)

@@ -13,6 +13,7 @@
 #include "esvr/container.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
+#include "esvr/volume.h"
 
 namespace esvr {
 
@@ -50,6 +51,10 @@ inline constexpr double kFinestFactor = 1.0 / 64.0, kCoarsestFactor = 1024.0;
 [[nodiscard]] VectorGrid decodeVectorAtResolution(const std::string& name,
                                                   StoredComponents components, double factor,
                                                   const DecodeOptions& options = {});
+
+/// The averages of a volume over voxels of `factor`^3 of its own, by the rules of decodeAtResolution() for grids that are
+/// no level sets, with a background near the values. \param factor  1 or above
+[[nodiscard]] SparseVolume coarsened(const SparseVolume& volume, int factor);
 
 /// Bytes of memory that decodeAtResolution() takes at most, but for level sets.
 struct ResolutionBytes {
