@@ -3,12 +3,14 @@ import copy
 import io
 import json
 import pathlib
+import sys
 import tempfile
 import types
 import unittest
 from contextlib import redirect_stdout
 
-import record
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
+import record  # noqa: the path must be known first
 
 CASE = {"cpu": {"bytes": 10000, "user_seconds": 10.0, "seconds": 6.0, "memory": 5e7, "decode_seconds": 1.0,
                 "missed": False, "grids": {"density": {"psnr_box": 50.0, "psnr_active": 40.0, "psnr_t50": 35.0}}},
