@@ -12,7 +12,8 @@ or, for cases without the Python module, one that holds the programs side by sid
 subfolders. A rival is another program: SPERR, SZ3 or zfp and the path of their sperr3d, sz3 or zfp, or vdb_lod. The cases
 `formats` and `resolution` give their rivals to esvr-compare (docs/compare.md, "Compressors of your own").
 
-`page` writes a page of docs/figures from the figures there. It needs python3-matplotlib and python3-numpy.
+`page` writes the tables of a page of docs/figures, below its text, from the figures there. It needs python3-matplotlib and
+python3-numpy.
 """
 import argparse
 import importlib
@@ -40,6 +41,7 @@ SAMPLES = {"plume_112": ["plume", "--resolution", "112", "--seed", "77"],
            **{name: [name, "--resolution", "256"]
               for name in ("8area", "empty-sphere", "synth-tube", "synth-wiggle", "diffuse-scalar")}}
 BOXES = {"aneurism": "0,0,0,255,255,255", "hydrogen_atom": "0,0,0,127,127,127"}  # of the scans, as in the paper
+MADE = "<!-- tests/bench/bench.py makes what follows; do not edit it. -->\n"
 FOLDERS = {"vdb2esvr": "vdb2esvr", "esvr2vdb": "esvr2vdb", "esvr-compare": "compare", "esvr-render": "render",
            "esvr-sample": "samples", "swc2vdb": "samples"}
 
@@ -142,6 +144,14 @@ def table(head, lines, numbers_from=1):
     """A table in Markdown whose columns are aligned to the right from one on."""
     rule = "|" + "---|" * numbers_from + "--:|" * (len(head) - numbers_from)
     return "\n".join(["| " + " | ".join(head) + " |", rule, *("| " + " | ".join(line) + " |" for line in lines)]) + "\n"
+
+
+def write_page(path, text):
+    """Writes what a page has below its own text."""
+    head, mark, _ = path.read_text().partition(MADE)
+    if not mark:
+        raise SystemExit(f"{path} does not have the line {MADE.strip()}")
+    path.write_text(head + mark + "\n" + text)
 
 
 def table_of(rows):

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 import rivals
-from bench import call, table
+from bench import call, table, write_page
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "metrics"))
@@ -46,73 +46,8 @@ MEASURES = {"t90": "T 0.9", "t50": "T 0.5", "t10": "T 0.1", "t_same": "T at the 
 SHOWN = {"t_same": "T", "t_exposed": "T, exposed", "t_display": "T, display", "active": "active", "ssim": "SSIM"}
 CERTAIN = 3.0      # standard errors that the squared error of pictures must have
 
-# Of the run of 2026-11-28, whose figures the page has.
-FINDINGS = """
-- **Of two files of one smoke, T names the one with the better picture** in 99 % of the pairs by PSNR and in 87 % by FLIP. The
-  PSNR of active voxels, which most comparisons quote, does so in 68 % and 61 % (a coin: 50 %), SSIM of values in 82 %.
-- **Between smokes, T is not comparable where much of the box is empty**, because empty columns count. With all smokes, r is
-  0.47, 0.81 and 0.91 for T = 0.9, 0.5 and 0.1; without `double_grid`, it is 0.78, 0.98 and 0.99. *Exposed*, it is 0.85,
-  0.97 and 0.98 with all of them, and 0.95 for all densities together, where the PSNR of the picture is known to 2.7 dB. For one
-  smoke and density both differ by a constant, so that the order of files, and with it the choice between codings, is the
-  same. The programs measure T; a goal of so many dB is stricter for a smoke that fills its box than for one that does not.
-- **T misses haze.** SPERR leaves faint noise where the source is empty. Over black it is seen, and FLIP says so: its pictures
-  are 7.4 dB worse than T predicts. *In the values of a display*, the measure predicts FLIP better (r = 0.87, 95 % of the
-  pairs), but PSNR worse (91 % of the pairs).
-- **Light that is scattered** along the axes predicts as well as light that passes (r differs by 0.02 at most), and takes longer.
-- **A T of another density** is nearly as good for the order of files (T 0.5: 95 % by PSNR, 86 % by FLIP), but not for the size
-  of an error: r = 0.72.
-- Pictures of thin smoke (T = 0.9) are predicted worst. Their differences are small, and their noise is large.
-"""
-INTRODUCTION = """\
-# What Cycles shows, and what measures say of it
-
-*This page is made by `tests/bench/bench.py page calibration`; do not edit it.*
-
-The [PSNR of transmittance](../compare.md#the-psnr-of-transmittance) shall say how much of an error is seen in a picture of
-smoke. Here it is compared with pictures of a path tracer that knows nothing of it, and with other measures that need no
-renderer.
-{findings}
-## How it was measured
-
-- **Smokes.** {smokes} fog volumes: a simulation of Houdini (`smoke1`) and one of another solver (`double_grid`, 128 x 64 x 64),
-  a cloud, a body of fog, frames of two simulations of Blender, and two samples (`esvr-sample plume --resolution 112 --seed
-  77`, `blobs --resolution 88 --seed 77`). ESVR was not tuned with the last two and with `double_grid`, all of whose voxels
-  are active, but whose smoke is in 0.8 % of the columns.
-- **Results.** Each smoke is stored in six ways: by `vdb2esvr --size` in a hundredth and in a 25th of the bytes of its
-  half-float Blosc VDB (*low* and *high*), by `--measure values` in a 50th as ellipsoids and as voxels, by SPERR 0.8.5 in
-  the same bytes, and as it is, but without its faintest voxels, which have {dropped:.0f} % of its mass. Where the Blosc VDB has
-  fewer than 150,000 bytes, the parts are a 25th, an 18th and a tenth. Only the box of the active voxels of the source
-  counts, and values below 0 are 0.
-- **Pictures.** Cycles of Blender 3.4 draws the source and all results in {side} x {side} pixels at three densities, for which
-  the median column lets T = 0.9, 0.5 or 0.1 of the light through, with sun and material of
-  `tests/blender/render_pictures.py`. The picture shows the bounds of all voxels that are not 0, and is exposed such that the brightest
-  pixel of the source is white. Light is scattered once, as Blender does by default.
-- **Differences of pictures.** PSNR is that of linear light. FLIP is the mean of LDR-FLIP (Andersson et al. 2020) of the
-  sRGB values, 67 pixels a degree; as -20 log10, a tenth of it is 20 dB.
-- **Noise.** Each picture is drawn with two seeds. The squared error is the mean product of the differences of the one seed
-  and of the other, so that independent noise has no part in it, and FLIP is that of the average of both. {rows} rows,
-  pictures of a source and a result, have a squared error of at least {certain:.0f} standard errors ({each} for T = 0.9, 0.5 and
-  0.1). The {left_out} others, whose difference is lost in noise or is none, are left out, so that the correlations are
-  those of errors that can be seen.
-- **Measures.** *T* is `transmittancePsnr` (`esvr/metrics.h`). *Exposed*, its peak is the largest opacity of a column of the
-  source and not 1, and the squared errors are divided by the number of columns that are not empty. *In the values of a
-  display*, the opacities so exposed are sRGB values, as of white smoke over black.
-- **Figures.** r is Pearson's correlation of dB and dB, for each density and for all rows. *Off by* is the standard deviation
-  around the regression line. *Pairs in order*: of two results of a smoke at a density whose pictures differ by more than
-  {unlike:.0f} dB, the measure names the better one.
-
-This command measures it, one smoke after the other ({samples} samples a pixel and seed), and writes
-[calibration.json](calibration.json):
-
-    tests/bench/bench.py run calibration --bin BUILD --data DATA --out OUT --rival SPERR=PROGRAM
-
-![Measures and pictures](../img/calibration.png)
-
-These are all pictures of a fire, and those of `smoke1` (OUT/cycles_SMOKE.png):
-
-![Cycles' pictures of fluid_data_0071](../img/cycles_fluid_data_0071.png)
-
-![Cycles' pictures of smoke1](../img/cycles_smoke1.png)
+ROWS = """\
+{rows} rows, pictures of a source and a result, were compared ({each} for T = {light}). {left_out} others were left out.
 
 """
 BY_SMOKE = """\
@@ -443,11 +378,9 @@ def draw(rows, path):
 def page(docs):
     done = json.loads((docs / "figures/calibration.json").read_text())
     rows, left_out = rows_of(done)
-    text = INTRODUCTION.format(findings=FINDINGS, smokes=len(done), rows=len(rows), left_out=left_out, side=SIDE,
-                               certain=CERTAIN, unlike=UNLIKE, dropped=100 * DROPPED,
-                               each=", ".join(str(len(of(rows, light=str(light)))) for light in LIGHT),
-                               samples=", ".join(map(str, SAMPLES.values())))
+    text = ROWS.format(rows=len(rows), left_out=left_out, light=", ".join(map(str, LIGHT)),
+                       each=", ".join(str(len(of(rows, light=str(light)))) for light in LIGHT))
     text += f"## PSNR of the pictures\n\n{over_all(rows, 'PSNR')}\n## FLIP of the pictures\n\n{over_all(rows, 'FLIP')}\n"
     text += BY_SMOKE + by_smoke(rows, done) + "\n" + BY_RESULT + by_result(rows) + "\n" + NOISE + noise_table(done)
-    (docs / "figures/calibration.md").write_text(text)
+    write_page(docs / "figures/calibration.md", text)
     draw(rows, docs / "img/calibration.png")

@@ -395,44 +395,20 @@ def page(arguments):
     record = json.loads(arguments.record.read_text())
     before = json.loads(arguments.before.read_text()) if arguments.before else {"cases": {}}
     where = record["machine"]
-    gpu = where["gpu"] or "no GPU"
     failed = failures(record)
     drawn = table(DRAWN_COLUMNS, record, before)
     compared = ("" if not arguments.before else
-                "\nIn parentheses is the change from the record before, which was measured on "
+                "In parentheses is the change from the record before, which was measured on "
                 f"{before['machine']['date']} ({before['machine']['cpu']}, {before['machine']['gpu'] or 'no GPU'}). "
                 "**worse** marks more bytes by 0.5 %, a PSNR that is lower by 0.05 dB, and more seconds or fewer pictures a "
-                "second by 5 %.\n")
-    arguments.page.write_text(f"""# The record
-
-What this version does with ten volumes and six goals. `tests/bench/bench.py record` measures it and writes this page; run it
-again before and after a change that may cost bytes, quality or time:
-
-```
-tests/bench/bench.py record measure --bin build/release --data DATA --out new.json --jobs 2
-tests/bench/bench.py record compare docs/figures/record.json new.json
-```
-
-Measured on {where['date']}, on two cores ({where['cpu']}) for each conversion, and on {gpu}.
-
-- **bytes, PSNR**: of the file that `vdb2esvr --device cpu --threads 2` writes, measured by `esvr-compare check` over the
-  bounding box of the active voxels, over the active voxels and, of grids that are looked through, of the transmittance
-  ([compare.md](../compare.md#the-psnr-of-transmittance)). A file of several grids shows its density.
-- **CPU s, memory**: user seconds and the largest resident memory of that process. **decoding s**: seconds of `esvr2vdb`.
-- **GPU s, GPU bytes, GPU PSNR box**: seconds of the whole process with `--device cuda`, and what it writes.
-- `plume_256` is `esvr-sample plume --resolution 256`; gas_0004 has 24 grids, of which `--count 12000` takes the density.
-- Processes of less than {SHORT:g} seconds run {RUNS} times, and the smallest time counts.
-{compared}
-{table(COLUMNS, record, before)}
-""" + ("\nWhat failed:\n\n" + "\n".join(failed) + "\n" if failed else "") + (f"""
-## Drawing
-
-Pictures a second of a turn around the volume at 800 x 800, in the median, for the file that the GPU wrote and for the
-source as a NanoVDB grid, with the memory that each takes on the GPU. The PSNR is that of the pictures.
-The sum is drawn from the ellipsoids themselves (`--between sum`), where the file has them.
-
-{drawn}
-""" if drawn else ""))
+                "second by 5 %.\n\n")
+    text = (f"Measured on {where['date']}, on two cores ({where['cpu']}) for each conversion, and on "
+            f"{where['gpu'] or 'no GPU'}.\n\n{compared}{table(COLUMNS, record, before)}\n")
+    if failed:
+        text += "\nWhat failed:\n\n" + "\n".join(failed) + "\n"
+    if drawn:
+        text += f"\n## Drawing\n\n{drawn}\n"
+    bench.write_page(arguments.page, text)
     return 0
 
 

@@ -7,7 +7,7 @@ figures of both files in docs/figures/stability, and says so where one of them w
 import json
 import textwrap
 
-from bench import call, table
+from bench import call, table, write_page
 
 DEVICES = {"cpu": "CPU", "cuda": "CUDA"}
 COLORS = {0.5: "#3b82f6", 1.0: "#16a34a", 2.0: "#ea580c"}  # by multiples of the tuned step sizes
@@ -28,39 +28,6 @@ REASONS = {
                                "in integers, so that the order of threads changes no bit, which costs another unit for each "
                                "term. Both differences are far below the bound.",
 }
-
-INTRODUCTION = """\
-# Stability
-
-*This page is made by `tests/bench/bench.py page stability`; do not edit it.*
-
-How precise is float32 on ellipsoids that are difficult to evaluate, are the gradients right, and do fits converge? Each
-case below is measured in three ways:
-
-- **Evaluation.** A sum of ellipsoids is evaluated in float32 and by its definition in float64 at all voxels of up to 512
-  bricks. The CPU's is the function that decodes files, and CUDA's the decoder of `esvr-render`. Differences and bounds are
-  shares of the peak. The bound follows from the arithmetic ([math.md](../math.md#rounding)) and adds the worst case of all
-  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the
-  peak.
-- **Gradients.** The analytic derivatives of the squared error by all parameters of four ellipsoids and by kappa are
-  compared with central differences in float64, in a target of 16^3 random values. Errors are shares of the sum of the
-  magnitudes of the terms of the largest derivative of an ellipsoid. A case fails if an error is above its
-  [bound](../math.md#rounding).
-- **Fits.** A volume is fitted in {iterations} iterations with half of the tuned step sizes, with these, and with up to 64
-  times as large ones. A case fails if a fit with half, all or twice the step sizes ends early, has a number that is not
-  finite, or ends with a larger error than no ellipsoid at all.
-
-Some cases are volumes and not ellipsoids, and have fits only. A case has no gradients of its own if scaling or moving it
-makes it another case.
-
-The figures are made by these commands:
-
-    tests/bench/bench.py run stability --bin BUILD --out docs/figures/stability --device cpu --machine TEXT
-    tests/bench/bench.py run stability --bin BUILD --out docs/figures/stability --device cuda --machine TEXT
-    tests/bench/bench.py page stability
-
-"""
-
 
 def section(title, text):
     """The heading and the first paragraph of a section."""
@@ -322,9 +289,8 @@ def page(docs):
     first = next(iter(files.values()))
     cases = [Case(c, files) for c in first["cases"]]
     cases.sort(key=lambda case: not case.failures())
-    introduction = INTRODUCTION.format(allowed=ALLOWED, iterations=first["iterations"])
     sections = [results(cases), evaluation(cases), gradients(cases), fits(cases), steps(cases), curves(cases, docs / "img")]
-    (docs / "figures/stability.md").write_text(introduction + machines(files) + verdict(cases) + "\n".join(sections))
+    write_page(docs / "figures/stability.md", machines(files) + verdict(cases) + "\n".join(sections))
 
 
 def stability(bench):

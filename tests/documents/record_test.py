@@ -79,10 +79,13 @@ class Page(unittest.TestCase):
             folder = pathlib.Path(folder)
             (folder / "new.json").write_text(json.dumps(content(lambda case: case["cpu"].update(bytes=20000))))
             (folder / "old.json").write_text(json.dumps(content()))
+            (folder / "page.md").write_text("# What it is\n\n" + record.bench.MADE + "\nold figures\n")
             record.page(types.SimpleNamespace(record=folder / "new.json", before=folder / "old.json",
                                               page=folder / "page.md"))
             text = (folder / "page.md").read_text()
         self.assertIn("| smoke1 | default | 20,000 (+100.0 %) **worse** | 50.00 | 40.00 | 35.00 | 10.00 | 50 | 1.00 | 2.00 |", text)
+        self.assertTrue(text.startswith("# What it is\n"))
+        self.assertNotIn("old figures", text)
         self.assertIn("| smoke1 | default | 500 | 1000 | 60.00 |", text)
 
 
