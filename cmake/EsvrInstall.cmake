@@ -1,4 +1,44 @@
-# Installs the library, its headers, the package for find_package(esvr) and the file for pkg-config.
+# Installs the library, its headers, the package for find_package and the file for pkg-config: those of the decoder in a
+# build with ESVR_DECODER_ONLY, and those of libesvr in every other.
+
+# esvr_pkg_config(<name> <target> <private libraries>) makes and installs <name>.pc, with which a
+# program links the target. `pkg-config --static` adds the private libraries, which a static library
+# needs, and those of C++, because the program may be written in C.
+function(esvr_pkg_config name target privateLibraries)
+  get_target_property(type ${target} TYPE)
+  set(ESVR_PC_PRIVATE "")
+  if(type STREQUAL STATIC_LIBRARY)
+    set(ESVR_PC_PRIVATE ${privateLibraries} -lstdc++ -lm -pthread ${CMAKE_DL_LIBS})
+    list(TRANSFORM ESVR_PC_PRIVATE REPLACE "^([a-z]+)$" "-l\\1") # CMAKE_DL_LIBS names libraries
+    list(JOIN ESVR_PC_PRIVATE " " ESVR_PC_PRIVATE)
+  endif()
+  set(ESVR_PC_NAME ${name})
+  set(ESVR_PC_LIBRARY ${target})
+  if(ESVR_DEB)
+    set(ESVR_PC_PREFIX ${CMAKE_INSTALL_PREFIX})
+  else() # relative, so that an installation can be moved
+    file(RELATIVE_PATH ESVR_PC_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+    string(REGEX REPLACE "/$" "" ESVR_PC_PREFIX "\${pcfiledir}/${ESVR_PC_PREFIX}")
+  endif()
+  set(file ${PROJECT_BINARY_DIR}/${name}.pc)
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/esvr.pc.in ${file} @ONLY)
+  install(FILES ${file} DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+endfunction()
+
+if(ESVR_DECODER_ONLY)
+  install(TARGETS esvr_decoder EXPORT esvrDecoderTargets)
+  install(FILES libesvr/include/esvr/esvr.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/esvr)
+  install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+  install(
+    EXPORT esvrDecoderTargets
+    NAMESPACE esvr::
+    FILE esvrDecoderConfig.cmake
+    DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/esvrDecoder)
+  set_target_properties(esvr_decoder PROPERTIES EXPORT_NAME decoder)
+  esvr_pkg_config(esvr_decoder esvr_decoder "")
+  return()
+endif()
+
 # The component `library` has a shared library, `development` has everything else that another
 # project needs, `programs` has the programs, `python` has the Python module, and `images` has the programs
 # that are written in Python.
@@ -58,7 +98,6 @@ install(
   DESTINATION ${packageDir}
   COMPONENT development)
 
-include(EsvrPkgConfig)
 set(privateLibraries "")
 if(ESVR_STATIC)
   set(privateLibraries -lopenvdb -ltbb -lblosc -lz -lxxhash)

@@ -1,33 +1,27 @@
-#!/usr/bin/env python3
-"""How well cheap measures of a volume predict what Cycles shows of it.
+"""How well cheap measures of a volume predict what Cycles shows of it (docs/figures/calibration.md).
 
-    calibration.py measure --bin FOLDER --data FOLDER --out FOLDER --sperr PROGRAM [--smokes NAME...]
-    calibration.py page [--json FILE] [--docs FOLDER]
-
-`measure` converts each smoke in several ways, lets Cycles draw the source and all results at three densities, and writes
-the differences of the pictures and of the volumes to OUT/calibration.json, and the pictures to OUT/cycles_SMOKE.png.
-Smokes that the file has are not measured again. FOLDER of --bin is a build folder with the Python module; Blender 3.4,
-SPERR 0.8.5, python3-numpy and python3-matplotlib are needed. `page` makes docs/figures/calibration.md and its chart.
+`bench.py run calibration` converts each smoke in several ways, lets Cycles draw the source and all results at three
+densities, and writes the differences of the pictures and of the volumes to OUT/calibration.json, and the pictures to
+OUT/cycles_SMOKE.png. It needs Blender 3.4, SPERR 0.8.5 and the Python module.
 """
-import argparse
 import json
 import math
 import pathlib
 import sys
+from functools import partial
 
 import numpy as np
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
-sys.path[:0] = [str(HERE), str(ROOT / "tests/metrics")]
-import make_flip_fixture as flip_of_paper  # noqa: the path must be known first
-import pictures  # noqa
+import rivals
+from bench import call, table, write_page
 
-# Smokes and options of esvr-sample; the others are files. ESVR was not tuned with those of a seed, nor with double_grid.
-SMOKES = {"smoke1": None, "wdas_cloud_sixteenth": None, "double_grid": None, "dragon_with_xform": None, "gas_0003": None,
-          "gas_0006": None, "fluid_data_0041": None, "fluid_data_0071": None,
-          "plume_112": ["plume", "--resolution", 112, "--seed", 77],
-          "blobs_88": ["blobs", "--resolution", 88, "--seed", 77]}
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "metrics"))
+import make_flip_fixture as flip_of_paper  # noqa: the path must be known first
+
+# ESVR was not tuned with the last two, nor with double_grid.
+SMOKES = ["smoke1", "wdas_cloud_sixteenth", "double_grid", "dragon_with_xform", "gas_0003", "gas_0006", "fluid_data_0041",
+          "fluid_data_0071", "plume_112", "blobs_88"]
 # Parts of the bytes of the half-float Blosc VDB. Small files hold little but headers at a hundredth.
 PARTS = {"low": 100, "middle": 50, "high": 25}
 SMALL, SMALL_PARTS = 150_000, {"low": 25, "middle": 18, "high": 10}
@@ -52,73 +46,8 @@ MEASURES = {"t90": "T 0.9", "t50": "T 0.5", "t10": "T 0.1", "t_same": "T at the 
 SHOWN = {"t_same": "T", "t_exposed": "T, exposed", "t_display": "T, display", "active": "active", "ssim": "SSIM"}
 CERTAIN = 3.0      # standard errors that the squared error of pictures must have
 
-# Of the run of 2026-11-28, whose figures the page has.
-FINDINGS = """
-- **Of two files of one smoke, T names the one with the better picture** in 99 % of the pairs by PSNR and in 87 % by FLIP. The
-  PSNR of active voxels, which most comparisons quote, does so in 68 % and 61 % (a coin: 50 %), SSIM of values in 82 %.
-- **Between smokes, T is not comparable where much of the box is empty**, because empty columns count. With all smokes, r is
-  0.47, 0.81 and 0.91 for T = 0.9, 0.5 and 0.1; without `double_grid`, it is 0.78, 0.98 and 0.99. *Exposed*, it is 0.85,
-  0.97 and 0.98 with all of them, and 0.95 for all densities together, where the PSNR of the picture is known to 2.7 dB. For one
-  smoke and density both differ by a constant, so that the order of files, and with it the choice between codings, is the
-  same. The programs measure T; a goal of so many dB is stricter for a smoke that fills its box than for one that does not.
-- **T misses haze.** SPERR leaves faint noise where the source is empty. Over black it is seen, and FLIP says so: its pictures
-  are 7.4 dB worse than T predicts. *In the values of a display*, the measure predicts FLIP better (r = 0.87, 95 % of the
-  pairs), but PSNR worse (91 % of the pairs).
-- **Light that is scattered** along the axes predicts as well as light that passes (r differs by 0.02 at most), and takes longer.
-- **A T of another density** is nearly as good for the order of files (T 0.5: 95 % by PSNR, 86 % by FLIP), but not for the size
-  of an error: r = 0.72.
-- Pictures of thin smoke (T = 0.9) are predicted worst. Their differences are small, and their noise is large.
-"""
-INTRODUCTION = """\
-# What Cycles shows, and what measures say of it
-
-*This page is made by `tests/bench/calibration.py`; do not edit it.*
-
-The [PSNR of transmittance](../compare.md#the-psnr-of-transmittance) shall say how much of an error is seen in a picture of
-smoke. Here it is compared with pictures of a path tracer that knows nothing of it, and with other measures that need no
-renderer.
-{findings}
-## How it was measured
-
-- **Smokes.** {smokes} fog volumes: a simulation of Houdini (`smoke1`) and one of another solver (`double_grid`, 128 x 64 x 64),
-  a cloud, a body of fog, frames of two simulations of Blender, and two samples (`esvr-sample plume --resolution 112 --seed
-  77`, `blobs --resolution 88 --seed 77`). ESVR was not tuned with the last two and with `double_grid`, all of whose voxels
-  are active, but whose smoke is in 0.8 % of the columns.
-- **Results.** Each smoke is stored in six ways: by `vdb2esvr --size` in a hundredth and in a 25th of the bytes of its
-  half-float Blosc VDB (*low* and *high*), by `--measure values` in a 50th as ellipsoids and as voxels, by SPERR 0.8.5 in
-  the same bytes, and as it is, but without its faintest voxels, which have {dropped:.0f} % of its mass. Where the Blosc VDB has
-  fewer than 150,000 bytes, the parts are a 25th, an 18th and a tenth. Only the box of the active voxels of the source
-  counts, and values below 0 are 0.
-- **Pictures.** Cycles of Blender 3.4 draws the source and all results in {side} x {side} pixels at three densities, for which
-  the median column lets T = 0.9, 0.5 or 0.1 of the light through, with sun and material of
-  `tests/blender/render_pictures.py`. The picture shows the bounds of all voxels that are not 0, and is exposed such that the brightest
-  pixel of the source is white. Light is scattered once, as Blender does by default.
-- **Differences of pictures.** PSNR is that of linear light. FLIP is the mean of LDR-FLIP (Andersson et al. 2020) of the
-  sRGB values, 67 pixels a degree; as -20 log10, a tenth of it is 20 dB.
-- **Noise.** Each picture is drawn with two seeds. The squared error is the mean product of the differences of the one seed
-  and of the other, so that independent noise has no part in it, and FLIP is that of the average of both. {rows} rows,
-  pictures of a source and a result, have a squared error of at least {certain:.0f} standard errors ({each} for T = 0.9, 0.5 and
-  0.1). The {left_out} others, whose difference is lost in noise or is none, are left out, so that the correlations are
-  those of errors that can be seen.
-- **Measures.** *T* is `transmittancePsnr` (`esvr/metrics.h`). *Exposed*, its peak is the largest opacity of a column of the
-  source and not 1, and the squared errors are divided by the number of columns that are not empty. *In the values of a
-  display*, the opacities so exposed are sRGB values, as of white smoke over black.
-- **Figures.** r is Pearson's correlation of dB and dB, for each density and for all rows. *Off by* is the standard deviation
-  around the regression line. *Pairs in order*: of two results of a smoke at a density whose pictures differ by more than
-  {unlike:.0f} dB, the measure names the better one.
-
-This command measures it, one smoke after the other ({samples} samples a pixel and seed), and writes
-[calibration.json](calibration.json):
-
-    tests/bench/calibration.py measure --bin BUILD --data DATA --out OUT --sperr PROGRAM
-
-![Measures and pictures](../img/calibration.png)
-
-These are all pictures of a fire, and those of `smoke1` (OUT/cycles_SMOKE.png):
-
-![Cycles' pictures of fluid_data_0071](../img/cycles_fluid_data_0071.png)
-
-![Cycles' pictures of smoke1](../img/cycles_smoke1.png)
+ROWS = """\
+{rows} rows, pictures of a source and a result, were compared ({each} for T = {light}). {left_out} others were left out.
 
 """
 BY_SMOKE = """\
@@ -235,97 +164,85 @@ def draw_sheet(shown, results, path):
     pyplot.close(figure)
 
 
-class Bench(pictures.Bench):
-    def source(self, name):
-        if not SMOKES[name]:
-            return super().source(name)
-        path = self.out / f"{name}.vdb"
-        if not path.exists():
-            pictures.run(self.bin / "samples/esvr-sample", SMOKES[name][0], path, *SMOKES[name][1:])
-        return path
-
-    def by_esvr(self, source, size, *options):
-        import esvr
-        file, back = self.out / "made.esvr", self.out / "made.vdb"
-        pictures.run(self.bin / "vdb2esvr/vdb2esvr", source, file, "--grid", "density", "--size", size, *options, "--device",
-                     "cpu", "--threads", 1, "--quiet", "--force")
-        pictures.run(self.bin / "esvr2vdb/esvr2vdb", file, back, "--quiet", "--force")
-        return esvr.Volume.from_vdb(back, "density"), file.stat().st_size
-
-    def results(self, source, volume):
-        """Title, volume and bytes of each result."""
-        import esvr
-        blosc = self.out / "made.vdb"
-        volume.save(blosc, overwrite=True)
-        whole = blosc.stat().st_size
-        size = {name: whole // part for name, part in (SMALL_PARTS if whole < SMALL else PARTS).items()}
-        yield "ESVR, low", *self.by_esvr(source, size["low"])
-        yield "ESVR, high", *self.by_esvr(source, size["high"])
-        yield "ellipsoids for values", *self.by_esvr(source, size["middle"], "--measure", "values", "--representation",
-                                                     "ellipsoids")
-        yield "voxels for values", *self.by_esvr(source, size["middle"], "--measure", "values", "--representation", "voxels")
-        path, taken = self.by_sperr(volume, size["middle"])
-        yield "SPERR", esvr.Volume.from_vdb(path), taken
-        values = np.sort(volume.to_numpy(), axis=None)
-        least = values[np.searchsorted(np.cumsum(values, dtype=np.float64), DROPPED * values.sum(dtype=np.float64))]
-        array = volume.to_numpy()
-        array[array <= least] = 0
-        yield "faint voxels dropped", esvr.Volume.from_numpy(array, origin=list(volume.box[0])), None
-
-    def draw(self, jobs):
-        """The pictures of jobs: an array, a density, a seed and samples each."""
-        import esvr
-        drawn, volumes = [], {}
-        for i, (array, density, seed, samples) in enumerate(jobs):
-            if id(array) not in volumes:
-                volumes[id(array)] = self.out / f"drawn_{len(volumes)}.vdb"
-                esvr.Volume.from_numpy(array).save(volumes[id(array)], overwrite=True)
-            drawn.append({"volume": str(volumes[id(array)]), "density": density, "seed": seed, "samples": samples,
-                          "out": str(self.out / f"drawn_{i}.npy")})
-        job = self.out / "job.json"
-        job.write_text(json.dumps({"side": SIDE, "pictures": drawn}))
-        pictures.run("blender", "--background", "--factory-startup", "--python-exit-code", 1, "--python",
-                     HERE / "calibration_pictures.py", "--", job)
-        return [np.load(picture["out"]) for picture in drawn]
-
-    def measure(self, name):
-        """All figures of a smoke."""
-        import esvr
-        path = self.source(name)
-        volume = esvr.Volume.from_vdb(path, "density")
-        source = np.maximum(volume.to_numpy(), 0)
-        depth = esvr.compare(volume, volume).median_depth
-        made = [(title, back, np.maximum(back.to_numpy(volume.box), 0), taken)
-                for title, back, taken in self.results(path, volume)]
-        k = {light: -math.log(light) / depth for light in LIGHT}
-        arrays = [source, *(array for _, _, array, _ in made)]
-        drawn = iter(self.draw([(array, k[light], seed, SAMPLES[light])
-                                for light in LIGHT for seed in (1, 2) for array in arrays]))
-        results = {title: {"bytes": taken, "values": of_values(volume, back, source, array), "light": {}}
-                   for title, back, array, taken in made}
-        noise, shown = {}, {}
-        for light in LIGHT:
-            seeds = [[next(drawn) for _ in arrays] for _ in (1, 2)]
-            exposure = 1 / float(seeds[0][0].max())
-            noise[light] = of_pictures([seeds[0][0]], [seeds[1][0]], exposure)
-            shown[light] = [display(exposure * (a + b) / 2) for a, b in zip(*seeds)]
-            for i, (title, _, array, _) in enumerate(made, 1):
-                results[title]["light"][light] = {
-                    "measures": of_light(source, array, k[light]),
-                    "pictures": of_pictures(*([seed[j] for seed in seeds] for j in (0, i)), exposure)}
-        draw_sheet(shown, results, self.out / f"cycles_{name}.png")
-        return {"voxels": volume.active_voxels, "noise": noise, "results": results}
+def by_esvr(bench, source, size, *options):
+    import esvr
+    file, back = bench.out / "made.esvr", bench.out / "made.vdb"
+    bench.run("vdb2esvr", source, file, "--grid", "density", "--size", size, *options, "--device", "cpu", "--threads", 1,
+              "--quiet", "--force")
+    bench.run("esvr2vdb", file, back, "--quiet", "--force")
+    return esvr.Volume.from_vdb(back, "density"), file.stat().st_size
 
 
-def measure(arguments):
-    bench = Bench(arguments)
-    path = bench.out / "calibration.json"
-    done = json.loads(path.read_text()) if path.exists() else {}
-    for name in arguments.smokes or SMOKES:
-        if name not in done:
-            done[name] = bench.measure(name)
-            path.write_text(json.dumps(done, indent=1) + "\n")
-            print(name, file=sys.stderr, flush=True)
+def results_of(bench, source, volume):
+    """Title, volume and bytes of each result."""
+    import esvr
+    blosc = bench.out / "made.vdb"
+    volume.save(blosc, overwrite=True)
+    whole = blosc.stat().st_size
+    size = {name: whole // part for name, part in (SMALL_PARTS if whole < SMALL else PARTS).items()}
+    for_values = ["--measure", "values", "--representation"]
+    yield "ESVR, low", *by_esvr(bench, source, size["low"])
+    yield "ESVR, high", *by_esvr(bench, source, size["high"])
+    yield "ellipsoids for values", *by_esvr(bench, source, size["middle"], *for_values, "ellipsoids")
+    yield "voxels for values", *by_esvr(bench, source, size["middle"], *for_values, "voxels")
+    path, taken = rivals.to_size(bench, "SPERR", volume, size["middle"])
+    yield "SPERR", esvr.Volume.from_vdb(path), taken
+    values = np.sort(volume.to_numpy(), axis=None)
+    least = values[np.searchsorted(np.cumsum(values, dtype=np.float64), DROPPED * values.sum(dtype=np.float64))]
+    array = volume.to_numpy()
+    array[array <= least] = 0
+    yield "faint voxels dropped", esvr.Volume.from_numpy(array, origin=list(volume.box[0])), None
+
+
+def draw_with_cycles(bench, jobs):
+    """The pictures of jobs: an array, a density, a seed and samples each."""
+    import esvr
+    drawn, volumes = [], {}
+    for i, (array, density, seed, samples) in enumerate(jobs):
+        if id(array) not in volumes:
+            volumes[id(array)] = bench.out / f"drawn_{len(volumes)}.vdb"
+            esvr.Volume.from_numpy(array).save(volumes[id(array)], overwrite=True)
+        drawn.append({"volume": str(volumes[id(array)]), "density": density, "seed": seed, "samples": samples,
+                      "out": str(bench.out / f"drawn_{i}.npy")})
+    job = bench.out / "job.json"
+    job.write_text(json.dumps({"side": SIDE, "pictures": drawn}))
+    call("blender", "--background", "--factory-startup", "--python-exit-code", 1, "--python", HERE / "cycles.py", "--", job)
+    return [np.load(picture["out"]) for picture in drawn]
+
+
+def figures_of(bench, name):
+    """All figures of a smoke."""
+    import esvr
+    path = bench.volume(name)
+    volume = esvr.Volume.from_vdb(path, "density")
+    source = np.maximum(volume.to_numpy(), 0)
+    depth = esvr.compare(volume, volume).median_depth
+    made = [(title, back, np.maximum(back.to_numpy(volume.box), 0), taken)
+            for title, back, taken in results_of(bench, path, volume)]
+    k = {light: -math.log(light) / depth for light in LIGHT}
+    arrays = [source, *(array for _, _, array, _ in made)]
+    drawn = iter(draw_with_cycles(bench, [(array, k[light], seed, SAMPLES[light])
+                                          for light in LIGHT for seed in (1, 2) for array in arrays]))
+    results = {title: {"bytes": taken, "values": of_values(volume, back, source, array), "light": {}}
+               for title, back, array, taken in made}
+    noise, shown = {}, {}
+    for light in LIGHT:
+        seeds = [[next(drawn) for _ in arrays] for _ in (1, 2)]
+        exposure = 1 / float(seeds[0][0].max())
+        noise[light] = of_pictures([seeds[0][0]], [seeds[1][0]], exposure)
+        shown[light] = [display(exposure * (a + b) / 2) for a, b in zip(*seeds)]
+        for i, (title, _, array, _) in enumerate(made, 1):
+            results[title]["light"][light] = {
+                "measures": of_light(source, array, k[light]),
+                "pictures": of_pictures(*([seed[j] for seed in seeds] for j in (0, i)), exposure)}
+    draw_sheet(shown, results, bench.out / f"cycles_{name}.png")
+    return {"voxels": volume.active_voxels, "noise": noise, "results": results}
+
+
+def calibration(bench):
+    """Measures of volumes beside Cycles' pictures of them (docs/figures/calibration.md)."""
+    for name in bench.chosen(SMOKES):
+        yield (name,), partial(figures_of, bench, name)
 
 
 # The page.
@@ -384,11 +301,6 @@ def rows_of(done):
 
 def cell(value, digits=2):
     return "-" if value is None else f"{value:.{digits}f}"
-
-
-def table(head, lines):
-    return "\n".join(["| " + " | ".join(head) + " |", "|---" + "|--:" * (len(head) - 1) + "|",
-                      *("| " + " | ".join(line) + " |" for line in lines)]) + "\n"
 
 
 def of(rows, **wanted):
@@ -463,37 +375,12 @@ def draw(rows, path):
     figure.savefig(path, dpi=80)
 
 
-def page(arguments):
-    done = json.loads((arguments.json or arguments.docs / "figures/calibration.json").read_text())
+def page(docs):
+    done = json.loads((docs / "figures/calibration.json").read_text())
     rows, left_out = rows_of(done)
-    text = INTRODUCTION.format(findings=FINDINGS, smokes=len(done), rows=len(rows), left_out=left_out, side=SIDE,
-                               certain=CERTAIN, unlike=UNLIKE, dropped=100 * DROPPED,
-                               each=", ".join(str(len(of(rows, light=str(light)))) for light in LIGHT),
-                               samples=", ".join(map(str, SAMPLES.values())))
+    text = ROWS.format(rows=len(rows), left_out=left_out, light=", ".join(map(str, LIGHT)),
+                       each=", ".join(str(len(of(rows, light=str(light)))) for light in LIGHT))
     text += f"## PSNR of the pictures\n\n{over_all(rows, 'PSNR')}\n## FLIP of the pictures\n\n{over_all(rows, 'FLIP')}\n"
     text += BY_SMOKE + by_smoke(rows, done) + "\n" + BY_RESULT + by_result(rows) + "\n" + NOISE + noise_table(done)
-    (arguments.docs / "figures/calibration.md").write_text(text)
-    draw(rows, arguments.docs / "img/calibration.png")
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = parser.add_subparsers(dest="command", required=True)
-    job = commands.add_parser("measure", help="measure smokes")
-    job.add_argument("--bin", type=pathlib.Path, required=True)
-    job.add_argument("--data", type=pathlib.Path, required=True)
-    job.add_argument("--out", type=pathlib.Path, required=True)
-    job.add_argument("--sperr", required=True, metavar="PROGRAM", help="sperr3d")
-    job.add_argument("--smokes", nargs="+", metavar="NAME", choices=SMOKES, help="only these")
-    job.set_defaults(do=measure)
-    job = commands.add_parser("page", help="make the page")
-    job.add_argument("--json", type=pathlib.Path, help="default: figures/calibration.json of DOCS")
-    job.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs")
-    job.set_defaults(do=page)
-    arguments = parser.parse_args()
-    arguments.do(arguments)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    write_page(docs / "figures/calibration.md", text)
+    draw(rows, docs / "img/calibration.png")

@@ -1,9 +1,8 @@
-#!/usr/bin/env python3
 """The record: one table of what this version of the programs does, to compare with the version before.
 
-    record.py measure --bin FOLDER --data FOLDER --out record.json [--jobs N] [--resume]
-    record.py page record.json [--before OLD.json] [--page docs/figures/record.md]
-    record.py compare OLD.json NEW.json
+    bench.py record measure --bin FOLDER --data FOLDER --out record.json [--jobs N] [--resume]
+    bench.py record page record.json [--before OLD.json] [--page docs/figures/record.md]
+    bench.py record compare OLD.json NEW.json
 
 `measure` converts ten volumes with six goals and writes the figures of each case to the JSON file as soon as they are
 known. With --resume it measures only what that file does not have. FOLDER of --bin is a build folder, or one that holds
@@ -17,7 +16,6 @@ cores. --seconds S ends the run after S seconds without what is not finished the
 worse and exits with 4 if there are some. Worse are: more bytes by 0.5 %, a PSNR that is lower by 0.05 dB, more seconds
 or fewer pictures a second by 5 %, and a failure where there was none.
 """
-import argparse
 import json
 import math
 import os
@@ -31,6 +29,8 @@ import tempfile
 import threading
 import time
 
+import bench
+
 VOLUMES = ["wdas_cloud_sixteenth", "neuron_m207", "neuron_rp140212", "plume_256", "smoke1", "cube_levelset",
            "hydrogen_atom", "aneurism", "gas_0004", "dragon_with_xform"]
 GOALS = {"default": [], "ratio": ["--ratio", "50"], "psnr": ["--psnr", "50"], "max-error": ["--max-error", "1%"],
@@ -40,8 +40,6 @@ LONGEST_FIRST = ["count", "psnr", "default", "ratio", "max-error", "lossless"]
 ONE_GRID = {("gas_0004", "count"): ["--grid", "density"]}
 DRAWN_VOLUMES = ["aneurism", "smoke1", "wdas_cloud_sixteenth", "neuron_rp140212", "neuron_m207", "hydrogen_atom"]
 DRAWN_GOALS = ["default", "count"]
-PROGRAMS = {"vdb2esvr": "vdb2esvr", "esvr2vdb": "esvr2vdb", "esvr-compare": "compare", "esvr-render": "render",
-            "esvr-sample": "samples"}
 RUNS = 3             # times of short processes are the smallest of this many runs
 SHORT = 8.0          # seconds; processes that take longer run once
 GPU_CORES = 4        # cores of the processes that use the GPU
@@ -66,13 +64,6 @@ class Programs:
         self.deadline = time.monotonic() + arguments.seconds if arguments.seconds else math.inf
         self.limit = arguments.limit
 
-    def path(self, name):
-        for path in (self.folder / name, self.folder / PROGRAMS[name] / name):
-            if path.is_file():
-                return path
-        raise SystemExit(f"{name} is neither in {self.folder} nor in {self.folder / PROGRAMS[name]}; give the folder of "
-                         "the programs as --bin")
-
     def once(self, name, words, allowed):
         """Seconds, user seconds, bytes of memory and exit code of one run."""
         left = self.deadline - time.monotonic()
@@ -80,7 +71,7 @@ class Programs:
             raise OutOfTime
         with tempfile.TemporaryFile() as errors:
             begin = time.monotonic()
-            process = subprocess.Popen([str(self.path(name)), *map(str, words)], stdin=subprocess.DEVNULL,
+            process = subprocess.Popen([str(bench.program_in(self.folder, name)), *map(str, words)], stdin=subprocess.DEVNULL,
                                        stdout=subprocess.DEVNULL, stderr=errors)
             timer = threading.Timer(min(left, self.limit), process.kill)
             timer.start()
@@ -148,17 +139,14 @@ def machine():
 
 
 def volume_files(arguments, programs, folder):
-    """The path of each volume. The plume is generated."""
+    """The path of each volume. Samples are generated."""
     files = {}
     for name in arguments.volumes:
-        if name == "plume_256":
-            files[name] = folder / "plume_256.vdb"
-            programs.run("esvr-sample", ["plume", files[name], "--resolution", "256", "--force", "--quiet"], runs=1)
+        if name in bench.SAMPLES:
+            files[name] = folder / f"{name}.vdb"
+            programs.run("esvr-sample", [bench.SAMPLES[name][0], files[name], *bench.SAMPLES[name][1:], "--quiet"], runs=1)
         else:
-            found = sorted(arguments.data.resolve().rglob(f"{name}.vdb"))
-            if not found:
-                raise SystemExit(f"{arguments.data} has no {name}.vdb; --volumes names the volumes to measure")
-            files[name] = found[0]
+            files[name] = bench.find_volume(arguments.data.resolve(), name)
     return files
 
 
@@ -208,7 +196,7 @@ class Case:
         figures["grids"] = self.check(self.file("gpu"))
         return figures
 
-    def bench(self, device, *options):
+    def turn(self, device, *options):
         report = self.folder / f"{self.stem}_bench.json"
         self.programs.run("esvr-render", [self.file("gpu"), "--bench", "--ref", self.source, "--turntable", self.views,
                                           "--device", device, *options, "--report", report, "--force", "--quiet"], runs=1)
@@ -218,13 +206,13 @@ class Case:
         """Pictures a second of the file and of the source in NanoVDB, and how the pictures differ."""
         if not self.file("gpu").exists():
             self.convert("gpu", ["--device", device], runs=1)
-        report = self.bench(device)
+        report = self.turn(device)
         figures = {"fps": report["drawn"]["fps_median"], "nanovdb_fps": report["reference"]["fps_median"],
                    "picture_psnr": report["image"]["psnr"]["mean"], "device_bytes": report["drawn"]["device_bytes"],
                    "nanovdb_device_bytes": report["reference"]["device_bytes"]}
         if self.goal == "count":
             try:
-                report = self.bench(device, "--between", "sum")
+                report = self.turn(device, "--between", "sum")
                 figures.update(sum_fps=report["drawn"]["fps_median"], sum_picture_psnr=report["image"]["psnr"]["mean"])
             except Failed:
                 pass  # the file has voxels, because they took no more bytes than the ellipsoids
@@ -386,16 +374,16 @@ def cases_of(record):
 
 
 def table(columns, record, before):
-    """The rows of a Markdown table."""
-    rows = ["| volume | goal | " + " | ".join(c[0] for c in columns) + " |", "|---|---|" + "--:|" * len(columns)]
+    """A Markdown table; nothing if no case has such figures."""
+    lines = []
     for volume, goal, case in cases_of(record):
         if not any(c[1] in case for c in columns):
             continue
         cells = [cell(c, case, before["cases"].get(volume, {}).get(goal, {}))[0] for c in columns]
         name = f"`{' '.join(GOALS[goal])}`" if GOALS[goal] else goal
         missed = " (missed)" if case.get("cpu", {}).get("missed") else ""
-        rows.append(f"| {volume} | {name}{missed} | " + " | ".join(cells) + " |")
-    return "\n".join(rows)
+        lines.append([volume, name + missed, *cells])
+    return bench.table(["volume", "goal", *(c[0] for c in columns)], lines, numbers_from=2).strip() if lines else ""
 
 
 def failures(record):
@@ -407,44 +395,20 @@ def page(arguments):
     record = json.loads(arguments.record.read_text())
     before = json.loads(arguments.before.read_text()) if arguments.before else {"cases": {}}
     where = record["machine"]
-    gpu = where["gpu"] or "no GPU"
     failed = failures(record)
     drawn = table(DRAWN_COLUMNS, record, before)
     compared = ("" if not arguments.before else
-                "\nIn parentheses is the change from the record before, which was measured on "
+                "In parentheses is the change from the record before, which was measured on "
                 f"{before['machine']['date']} ({before['machine']['cpu']}, {before['machine']['gpu'] or 'no GPU'}). "
                 "**worse** marks more bytes by 0.5 %, a PSNR that is lower by 0.05 dB, and more seconds or fewer pictures a "
-                "second by 5 %.\n")
-    arguments.page.write_text(f"""# The record
-
-What this version does with ten volumes and six goals. `tests/bench/record.py` measures it and writes this page; run it
-again before and after a change that may cost bytes, quality or time:
-
-```
-python3 tests/bench/record.py measure --bin build/release --data DATA --out new.json --jobs 2
-python3 tests/bench/record.py compare docs/figures/record.json new.json
-```
-
-Measured on {where['date']}, on two cores ({where['cpu']}) for each conversion, and on {gpu}.
-
-- **bytes, PSNR**: of the file that `vdb2esvr --device cpu --threads 2` writes, measured by `esvr-compare check` over the
-  bounding box of the active voxels, over the active voxels and, of grids that are looked through, of the transmittance
-  ([compare.md](../compare.md#the-psnr-of-transmittance)). A file of several grids shows its density.
-- **CPU s, memory**: user seconds and the largest resident memory of that process. **decoding s**: seconds of `esvr2vdb`.
-- **GPU s, GPU bytes, GPU PSNR box**: seconds of the whole process with `--device cuda`, and what it writes.
-- `plume_256` is `esvr-sample plume --resolution 256`; gas_0004 has 24 grids, of which `--count 12000` takes the density.
-- Processes of less than {SHORT:g} seconds run {RUNS} times, and the smallest time counts.
-{compared}
-{table(COLUMNS, record, before)}
-""" + ("\nWhat failed:\n\n" + "\n".join(failed) + "\n" if failed else "") + (f"""
-## Drawing
-
-Pictures a second of a turn around the volume at 800 x 800, in the median, for the file that the GPU wrote and for the
-source as a NanoVDB grid, with the memory that each takes on the GPU. The PSNR is that of the pictures.
-The sum is drawn from the ellipsoids themselves (`--between sum`), where the file has them.
-
-{drawn}
-""" if "\n" in drawn.split("|\n", 1)[-1] else ""))
+                "second by 5 %.\n\n")
+    text = (f"Measured on {where['date']}, on two cores ({where['cpu']}) for each conversion, and on "
+            f"{where['gpu'] or 'no GPU'}.\n\n{compared}{table(COLUMNS, record, before)}\n")
+    if failed:
+        text += "\nWhat failed:\n\n" + "\n".join(failed) + "\n"
+    if drawn:
+        text += f"\n## Drawing\n\n{drawn}\n"
+    bench.write_page(arguments.page, text)
     return 0
 
 
@@ -465,9 +429,9 @@ def compare(arguments):
     return MISSED if worse else 0
 
 
-def parse():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    commands = parser.add_subparsers(dest="command", required=True)
+def add_commands(parser):
+    """Adds `measure`, `page` and `compare` to the driver."""
+    commands = parser.add_subparsers(dest="what", required=True)
     job = commands.add_parser("measure", help="measure the cases")
     job.add_argument("--bin", type=pathlib.Path, required=True, help="folder of the programs")
     job.add_argument("--data", type=pathlib.Path, required=True, help="folder with the volumes")
@@ -483,16 +447,13 @@ def parse():
     job.add_argument("--gpu", default="auto", help="auto, off, or the device of the programs' --device")
     job.add_argument("--views", type=int, default=360, help="pictures of a turn (360)")
     job.add_argument("--scratch", type=pathlib.Path, help="folder for the files (default: that of the system)")
+    job.set_defaults(do=measure)
     job = commands.add_parser("page", help="write the table")
     job.add_argument("record", type=pathlib.Path)
     job.add_argument("--before", type=pathlib.Path, help="an earlier record")
     job.add_argument("--page", type=pathlib.Path, default=pathlib.Path("docs/figures/record.md"))
+    job.set_defaults(do=page)
     job = commands.add_parser("compare", help="exit with 4 if figures got worse")
     job.add_argument("old", type=pathlib.Path)
     job.add_argument("new", type=pathlib.Path)
-    return parser.parse_args()
-
-
-if __name__ == "__main__":
-    ARGUMENTS = parse()
-    sys.exit({"measure": measure, "page": page, "compare": compare}[ARGUMENTS.command](ARGUMENTS))
+    job.set_defaults(do=compare)

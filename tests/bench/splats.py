@@ -1,17 +1,14 @@
-#!/usr/bin/env python3
-"""Splats in other tools: what formats lose of their optical depth, and pictures beside those of the volume.
+"""Splats in other tools: what formats lose of their optical depth, and pictures beside those of the volume (docs/splats.md).
 
-    splats.py --bin FOLDER --data FOLDER --out FOLDER --browser PROGRAM
-
-OUT is a folder in which `npm install @playcanvas/splat-transform @sparkjsdev/spark three playwright-core` was run. FOLDER
-of --bin is a build folder with the Python module; python3-numpy and python3-matplotlib are needed. The script prints the
-tables of docs/splats.md and writes OUT/splats_smoke1.png and OUT/splats_aneurism.png.
+OUT of `bench.py run splats` is a folder in which `npm install @playcanvas/splat-transform @sparkjsdev/spark three
+playwright-core` was run. Besides the rows, the case writes OUT/splats_smoke1.png and OUT/splats_aneurism.png.
 """
-import argparse
 import json
 import pathlib
-import subprocess
-import sys
+from functools import partial
+
+from bench import call
+from rivals import write_smoke_preset
 
 HERE = pathlib.Path(__file__).resolve().parent
 # A fit, its volume, and the options of vdb2esvr and esvr2vdb.
@@ -26,10 +23,6 @@ VIEWS = {"front": (0.35, 0.25, 1.0), "side": (1.0, 0.1, -0.2)}
 FORMATS = {".sog": [], ".compressed.ply": [], ".spz, version 3": ["--spz-version", "3"], ".spz, version 4": ["--spz-version", "4"]}
 FOV = 30
 SIDE = 512  # pixels, as in splats/page.html
-
-
-def run(*words, **options):
-    subprocess.run([str(word) for word in words], check=True, stdout=subprocess.DEVNULL, **options)
 
 
 def header_of(path):
@@ -76,120 +69,101 @@ def write_thinner(path, out, factor):
     out.write_bytes(header + end + table.tobytes())
 
 
-class Bench:
-    def __init__(self, arguments):
-        self.bin, self.data, self.out = (p.resolve() for p in (arguments.bin, arguments.data, arguments.out))
-        self.browser = arguments.browser
-        sys.path.insert(0, str(self.bin / "python"))
+def make(bench, scene):
+    """The file of ellipsoids and that of splats."""
+    volume, fit, look = SCENES[scene]
+    name = scene.replace(", ", "_").replace(" ", "_")
+    fitted, splats = bench.out / f"{name}.esvr", bench.out / f"{name}.ply"
+    if not fitted.exists():
+        bench.run("vdb2esvr", bench.volume(volume), fitted, "--representation", "ellipsoids", *fit)
+    bench.run("esvr2vdb", fitted, splats, "--colors", "1,1,1", "--force", *look)
+    return fitted, splats
 
-    def program(self, name, *words):
-        folder = {"esvr-render": "render"}.get(name, name)
-        run(self.bin / folder / name, *words)
 
-    def make(self, scene):
-        """The file of ellipsoids and that of splats."""
-        volume, fit, look = SCENES[scene]
-        name = scene.replace(", ", "_").replace(" ", "_")
-        fitted, splats = self.out / f"{name}.esvr", self.out / f"{name}.ply"
-        if not fitted.exists():
-            self.program("vdb2esvr", self.data / f"{volume}.vdb", fitted, "--representation", "ellipsoids", *fit)
-        self.program("esvr2vdb", fitted, splats, "--colors", "1,1,1", "--force", *look)
-        return fitted, splats
+def losses(bench, splats):
+    """What the depth of splats loses in each format, in percent."""
+    tool = ["node", bench.out / "node_modules/@playcanvas/splat-transform/bin/cli.mjs", "-q", "-w", "-g", "cpu"]
+    whole, back = depth_of(splats), bench.out / "back.ply"
+    for name, options in FORMATS.items():
+        packed = bench.out / f"packed{name.split(',')[0]}"
+        call(*tool, splats, *options, packed)
+        call(*tool, packed, back)
+        yield name, 100 * float(depth_of(back) / whole - 1)
 
-    def losses(self, splats):
-        """What the depth of splats loses in each format, in percent."""
-        tool = ["node", self.out / "node_modules/@playcanvas/splat-transform/bin/cli.mjs", "-q", "-w", "-g", "cpu"]
-        whole, back = depth_of(splats), self.out / "back.ply"
-        for name, options in FORMATS.items():
-            packed = self.out / f"packed{name.split(',')[0]}"
-            run(*tool, splats, *options, packed)
-            run(*tool, packed, back)
-            yield 100 * (depth_of(back) / whole - 1)
 
-    def thin(self):
-        """The splats of a thin smoke1 as esvr2vdb writes them, and those of the usual density made thinner."""
-        fitted, splats = self.make("smoke1")
-        usual = float(header_of(splats)["esvr_density_scale"][0])
-        ours, plain = self.out / "thin.ply", self.out / "thin_plain.ply"
-        self.program("esvr2vdb", fitted, ours, "--density-scale", usual * THIN, "--force")
-        write_thinner(splats, plain, THIN)
-        return {"smoke1, a 25th of the density": ours, "the same, opacities not rounded to 255ths": plain}
+def thin(bench):
+    """The splats of a thin smoke1 as esvr2vdb writes them, and those of the usual density made thinner."""
+    fitted, splats = make(bench, "smoke1")
+    usual = float(header_of(splats)["esvr_density_scale"][0])
+    ours, plain = bench.out / "thin.ply", bench.out / "thin_plain.ply"
+    bench.run("esvr2vdb", fitted, ours, "--density-scale", usual * THIN, "--force")
+    write_thinner(splats, plain, THIN)
+    return {"smoke1, a 25th of the density": ours, "the same, opacities not rounded to 255ths": plain}
 
-    def camera(self, volume, splats, direction):
-        """Writes the camera of esvr-render and that of the page, which see the same."""
-        import numpy as np
-        affine, comments = np.array(volume.transform), header_of(splats)
-        voxel = abs(np.linalg.det(affine[:3, :3])) ** (1 / 3)
-        to_world = np.array(comments["esvr_to_world"], float).reshape(4, 4)
-        box = np.array(volume.box, float)
-        middle, side = box.mean(0), (box[1] - box[0] + 1).max()
-        eye = middle + np.array(direction) / np.linalg.norm(direction) * side * 2.1
-        camera = {"eye": list(eye), "center": list(middle), "up": [0, 1, 0], "fov": FOV}
-        (self.out / "camera.json").write_text(json.dumps(camera))
-        back = np.linalg.inv(to_world[:3, :3])
-        place = lambda p: list((np.array(p) * voxel + affine[:3, 3] - to_world[3, :3]) @ back)
-        up = np.array([0, 1, 0]) @ back
-        view = {"eye": place(eye), "center": place(middle), "up": list(up / np.linalg.norm(up)), "fov": FOV,
-                "url": f"/{splats.name}"}
-        (self.out / "view.json").write_text(json.dumps(view))
-        self.transfer(volume.value_range[1], float(comments["esvr_density_scale"][0]) * voxel)
 
-    def transfer(self, highest, extinction):
-        """Writes a white transfer function whose extinction is in proportion to the value."""
-        import numpy as np
-        points = [[x, -np.expm1(-extinction * x), 0.5, 0] for x in np.linspace(0, highest, 1025)]
-        (self.out / "linear.json").write_text(json.dumps(
-            [{"Name": "linear", "ColorSpace": "RGB", "RGBPoints": [0, 1, 1, 1, highest, 1, 1, 1],
-              "Points": [float(number) for point in points for number in point]}]))
+def write_views(bench, volume, splats, direction):
+    """Writes the camera and the transfer function of esvr-render, and the view of the page that sees the same.
 
-    def pictures(self, scene, direction):
-        """The picture of the volume by esvr-render, and that of its splats by Spark."""
-        import esvr
-        import matplotlib.image
-        _, splats = self.make(scene)
-        source = self.data / f"{SCENES[scene][0]}.vdb"
-        self.camera(esvr.Volume.from_vdb(source), splats, direction)
-        drawn, shown = self.out / "volume.png", self.out / "spark.png"
-        self.program("esvr-render", source, drawn, "--camera", self.out / "camera.json", "--tf", self.out / "linear.json",
-                     "--range", "own", "--background", "0,0,0", "--resolution", f"{SIDE}x{SIDE}", "--step", "0.5", "--force")
-        run("node", HERE / "splats/draw.mjs", self.out, self.browser, self.out / "view.json", shown)
-        return [matplotlib.image.imread(path)[..., :3] for path in (drawn, shown)]
+    The transfer function is white, and its extinction in proportion to the value.
+    """
+    import numpy as np
+    affine, comments = np.array(volume.transform), header_of(splats)
+    voxel = abs(np.linalg.det(affine[:3, :3])) ** (1 / 3)
+    to_world = np.array(comments["esvr_to_world"], float).reshape(4, 4)
+    box = np.array(volume.box, float)
+    middle, side = box.mean(0), (box[1] - box[0] + 1).max()
+    eye = middle + np.array(direction) / np.linalg.norm(direction) * side * 2.1
+    camera = {"eye": list(eye), "center": list(middle), "up": [0, 1, 0], "fov": FOV}
+    (bench.out / "camera.json").write_text(json.dumps(camera))
+    back = np.linalg.inv(to_world[:3, :3])
+    place = lambda p: list((np.array(p) * voxel + affine[:3, 3] - to_world[3, :3]) @ back)  # noqa: E731
+    up = np.array([0, 1, 0]) @ back
+    view = {"eye": place(eye), "center": place(middle), "up": list(up / np.linalg.norm(up)), "fov": FOV,
+            "url": f"/{splats.name}"}
+    (bench.out / "view.json").write_text(json.dumps(view))
+    write_smoke_preset(bench.out / "linear.json", volume.value_range[1], float(comments["esvr_density_scale"][0]) * voxel, 1024)
+
+
+def pictures(bench, scene, direction):
+    """The picture of the volume by esvr-render, and that of its splats by Spark."""
+    import esvr
+    import matplotlib.image
+    _, splats = make(bench, scene)
+    source = bench.volume(SCENES[scene][0])
+    write_views(bench, esvr.Volume.from_vdb(source), splats, direction)
+    drawn, spark = bench.out / "volume.png", bench.out / "spark.png"
+    bench.run("esvr-render", source, drawn, "--camera", bench.out / "camera.json", "--tf", bench.out / "linear.json", "--range",
+              "own", "--background", "0,0,0", "--resolution", f"{SIDE}x{SIDE}", "--step", "0.5", "--force")
+    call("node", HERE / "splats/draw.mjs", bench.out, bench.arguments.browser, bench.out / "view.json", spark)
+    return [matplotlib.image.imread(path)[..., :3] for path in (drawn, spark)]
 
 
 def psnr(a, b):
     import numpy as np
-    return -10 * np.log10(((a.astype(float) - b) ** 2).mean())
+    return float(-10 * np.log10(((a.astype(float) - b) ** 2).mean()))
 
 
-def save(bench, name, pictures):
+def save(path, volume, splats):
     """The picture of a volume, that of its splats, and ten times their difference."""
     import matplotlib.image
     import numpy as np
-    volume, splats = pictures
     row = np.concatenate([volume, splats, np.clip(10 * np.abs(volume - splats), 0, 1)], 1)
-    half = row.reshape(SIDE // 2, 2, row.shape[1] // 2, 2, 3).mean((1, 3))
-    matplotlib.image.imsave(bench.out / f"splats_{name}.png", half)
+    matplotlib.image.imsave(path, row.reshape(SIDE // 2, 2, row.shape[1] // 2, 2, 3).mean((1, 3)))
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    for name in ("bin", "data", "out"):
-        parser.add_argument(f"--{name}", type=pathlib.Path, required=True)
-    parser.add_argument("--browser", default="/usr/bin/chromium")
-    bench = Bench(parser.parse_args())
-    print("| splats of |", " | ".join(FORMATS), "|")
+def splats(bench):
+    """What other formats lose of splats, and pictures of splats beside those of the volume (docs/splats.md)."""
+    def scene_row(scene):
+        _, path = make(bench, scene)
+        made = {view: pictures(bench, scene, direction) for view, direction in VIEWS.items()}
+        if scene == SCENES[scene][0]:
+            save(bench.out / f"splats_{scene}.png", *made["front"])
+        yield {"splats of": scene, "number": len(splats_of(path)[0]), **{view: psnr(*pair) for view, pair in made.items()},
+               **dict(losses(bench, path))}
+
+    def thin_rows():
+        return [{"splats of": name, **dict(losses(bench, path))} for name, path in thin(bench).items()]
+
     for scene in SCENES:
-        _, splats = bench.make(scene)
-        print(f"| {scene} |", " | ".join(f"{loss:+.2f} %" for loss in bench.losses(splats)), "|", flush=True)
-    for name, splats in bench.thin().items():
-        print(f"| {name} |", " | ".join(f"{loss:+.2f} %" for loss in bench.losses(splats)), "|", flush=True)
-    print("| splats of | number |", " | ".join(VIEWS), "|")
-    for scene, (volume, *_) in SCENES.items():
-        made = {view: bench.pictures(scene, direction) for view, direction in VIEWS.items()}
-        if scene == volume:
-            save(bench, volume, made["front"])
-        number = len(splats_of(bench.make(scene)[1])[0])
-        print(f"| {scene} | {number} |", " | ".join(f"{psnr(*p):.1f} dB" for p in made.values()), "|", flush=True)
-
-
-main()
+        yield (scene,), partial(scene_row, scene)
+    yield ("thin",), thin_rows

@@ -1,19 +1,13 @@
-#!/usr/bin/env python3
-"""Measures stiff and extreme cases, and writes docs/figures/stability.md from the figures.
+"""Stiff and extreme cases, and the page docs/figures/stability.md.
 
-    stability.py measure --bin BUILD --device cpu --machine TEXT   writes docs/figures/stability/cpu.json
-    stability.py measure --bin BUILD --device cuda --machine TEXT  writes docs/figures/stability/cuda.json
-    stability.py page                                              writes docs/figures/stability.md and its pictures (python3-matplotlib)
-
-BUILD has the program bench_stability (target of that name, with -DESVR_BUILD_BENCHMARKS=ON). TEXT describes the machine
-on the page. The page has the figures of both files; if one is missing, it says that they were not measured. --docs
-chooses another folder than docs/figures.
+`bench.py run stability --device cpu|cuda` runs bench_stability (target of that name, with -DESVR_BUILD_BENCHMARKS=ON), which
+writes OUT/cpu.json or OUT/cuda.json; TEXT of --machine describes the machine on the page. `bench.py page stability` has the
+figures of both files in docs/figures/stability, and says so where one of them was not measured.
 """
-import argparse
 import json
-import pathlib
-import subprocess
 import textwrap
+
+from bench import call, table, write_page
 
 DEVICES = {"cpu": "CPU", "cuda": "CUDA"}
 COLORS = {0.5: "#3b82f6", 1.0: "#16a34a", 2.0: "#ea580c"}  # by multiples of the tuned step sizes
@@ -34,39 +28,6 @@ REASONS = {
                                "in integers, so that the order of threads changes no bit, which costs another unit for each "
                                "term. Both differences are far below the bound.",
 }
-
-INTRODUCTION = """\
-# Stability
-
-*This page is made by `tests/bench/stability.py`; do not edit it.*
-
-How precise is float32 on ellipsoids that are difficult to evaluate, are the gradients right, and do fits converge? Each
-case below is measured in three ways:
-
-- **Evaluation.** A sum of ellipsoids is evaluated in float32 and by its definition in float64 at all voxels of up to 512
-  bricks. The CPU's is the function that decodes files, and CUDA's the decoder of `esvr-render`. Differences and bounds are
-  shares of the peak. The bound follows from the arithmetic ([math.md](../math.md#rounding)) and adds the worst case of all
-  operations. A case fails if the difference of a voxel is above its bound, or above {allowed:g} of the
-  peak.
-- **Gradients.** The analytic derivatives of the squared error by all parameters of four ellipsoids and by kappa are
-  compared with central differences in float64, in a target of 16^3 random values. Errors are shares of the sum of the
-  magnitudes of the terms of the largest derivative of an ellipsoid. A case fails if an error is above its
-  [bound](../math.md#rounding).
-- **Fits.** A volume is fitted in {iterations} iterations with half of the tuned step sizes, with these, and with up to 64
-  times as large ones. A case fails if a fit with half, all or twice the step sizes ends early, has a number that is not
-  finite, or ends with a larger error than no ellipsoid at all.
-
-Some cases are volumes and not ellipsoids, and have fits only. A case has no gradients of its own if scaling or moving it
-makes it another case.
-
-The figures are made by these commands:
-
-    python3 tests/bench/stability.py measure --bin build/release --device cpu --machine TEXT
-    python3 tests/bench/stability.py measure --bin build/release --device cuda --machine TEXT
-    python3 tests/bench/stability.py page
-
-"""
-
 
 def section(title, text):
     """The heading and the first paragraph of a section."""
@@ -159,11 +120,6 @@ class Case:
     def cells(self, cell):
         """A cell for each device. `cell` makes it from the figures of one."""
         return [cell(self.on[d]) if d in self.on else NOT_MEASURED for d in DEVICES]
-
-
-def table(header, rows):
-    lines = ["| " + " | ".join(header) + " |", "|---|" + "--:|" * (len(header) - 1)]
-    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows]) + "\n"
 
 
 def both(text):
@@ -321,44 +277,25 @@ def verdict(cases):
     return text + "".join(reason + "\n" for reason in known) + "\n"
 
 
-def load(docs):
-    paths = {device: docs / "stability" / f"{device}.json" for device in DEVICES}
+def load(figures):
+    paths = {device: figures / "stability" / f"{device}.json" for device in DEVICES}
     return {device: json.loads(path.read_text()) for device, path in paths.items() if path.exists()}
 
 
-def page(arguments):
-    files = load(arguments.docs)
+def page(docs):
+    files = load(docs / "figures")
     if not files:
-        raise SystemExit("nothing was measured; run stability.py measure")
+        raise SystemExit("nothing was measured; run the case stability")
     first = next(iter(files.values()))
     cases = [Case(c, files) for c in first["cases"]]
     cases.sort(key=lambda case: not case.failures())
-    introduction = INTRODUCTION.format(allowed=ALLOWED, iterations=first["iterations"])
-    sections = [results(cases), evaluation(cases), gradients(cases), fits(cases), steps(cases),
-                curves(cases, arguments.docs.parent / "img")]
-    (arguments.docs / "stability.md").write_text(introduction + machines(files) + verdict(cases)
-                                                 + "\n".join(sections))
+    sections = [results(cases), evaluation(cases), gradients(cases), fits(cases), steps(cases), curves(cases, docs / "img")]
+    write_page(docs / "figures/stability.md", machines(files) + verdict(cases) + "\n".join(sections))
 
 
-def measure(arguments):
-    folder = arguments.docs / "stability"
-    folder.mkdir(parents=True, exist_ok=True)
-    subprocess.run([arguments.bin / "tests/bench/stability/bench_stability", folder / f"{arguments.device}.json", "--device",
-                    arguments.device, "--machine", arguments.machine], check=True)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    jobs = {"measure": measure, "page": page}
-    parser.add_argument("what", choices=jobs)
-    parser.add_argument("--bin", type=pathlib.Path, default=pathlib.Path("build/release"))
-    parser.add_argument("--docs", type=pathlib.Path, default=pathlib.Path("docs/figures"))
-    parser.add_argument("--device", choices=DEVICES, default="cpu")
-    parser.add_argument("--machine", default="a machine that was not described")
-    arguments = parser.parse_args()
-    jobs[arguments.what](arguments)
-
-
-if __name__ == "__main__":
-    main()
+def stability(bench):
+    """Evaluation, gradients and fits of extreme cases in float32 on one device (docs/figures/stability.md)."""
+    device = "cpu" if bench.device == "auto" else bench.device
+    call(bench.bin / "tests/bench/stability/bench_stability", bench.out / f"{device}.json", "--device", device, "--machine",
+         bench.arguments.machine)
+    return ()  # the program writes all figures

@@ -28,6 +28,7 @@ namespace esvr {
 namespace {
 
 namespace fs = std::filesystem;
+using test::contentOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -42,10 +43,6 @@ class AtomicFileTest : public testing::Test {
 
 std::span<const std::byte> bytesOf(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
-}
-std::string contentOf(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 void put(const fs::path& path, std::string_view text) { std::ofstream(path) << text; }
 
@@ -228,10 +225,6 @@ class PartialFileTest : public testing::Test {
     PartialFile file(target(), false, PartialStart::kContinue);
     file.append(std::as_bytes(std::span(text)));
   }
-  [[nodiscard]] std::string content(const fs::path& path) const {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
   void expectRefused(bool overwrite, PartialStart start, const char* words) const {
     EXPECT_THAT(std::function<void()>([&] { PartialFile(target(), overwrite, start); }),
                 ThrowsMessage<RuntimeFailure>(HasSubstr(words)));
@@ -250,7 +243,7 @@ TEST_F(PartialFileTest, IsContinuedUntilItIsComplete) {
   file.replaceStart(std::as_bytes(std::span(std::string_view("ONE"))));
   file.commit();
   EXPECT_THAT(folder_.names(), ElementsAre("out.esvr"));
-  EXPECT_EQ(content(target()), "ONE three");
+  EXPECT_EQ(contentOf(target()), "ONE three");
 }
 
 TEST_F(PartialFileTest, LeavesNothingWithoutContent) {
@@ -261,7 +254,7 @@ TEST_F(PartialFileTest, LeavesNothingWithoutContent) {
 TEST_F(PartialFileTest, IsRefusedAsWanted) {
   leave("one");
   expectRefused(false, PartialStart::kRefuse, "out.esvr.partial");
-  EXPECT_EQ(content(PartialFile::pathFor(target())), "one");
+  EXPECT_EQ(contentOf(PartialFile::pathFor(target())), "one");
 }
 
 TEST_F(PartialFileTest, FollowsNoLinkAndOpensNoPipe) {
@@ -269,7 +262,7 @@ TEST_F(PartialFileTest, FollowsNoLinkAndOpensNoPipe) {
   std::ofstream(folder_ / "other") << "other";
   fs::create_symlink(folder_ / "other", partial);
   expectRefused(true, PartialStart::kContinue, "cannot write");
-  EXPECT_EQ(content(folder_ / "other"), "other");
+  EXPECT_EQ(contentOf(folder_ / "other"), "other");
   fs::remove(partial);
   ASSERT_EQ(::mkfifo(partial.c_str(), 0600), 0);
   expectRefused(true, PartialStart::kContinue, "not a regular file");
@@ -296,7 +289,7 @@ TEST_F(PartialFileTest, DoesNotTouchWhatAnotherProcessHasJustCompletedSlow) {
       } catch (const RuntimeFailure&) {  // the first process still has the lock
       }
     first.join();
-    ASSERT_EQ(content(target()), "first");
+    ASSERT_EQ(contentOf(target()), "first");
   }
 }
 
@@ -310,9 +303,9 @@ TEST_F(PartialFileTest, KeepsATargetThatExists) {
   expectRefused(false, PartialStart::kContinue, "exists already");
   PartialFile file(target(), true, PartialStart::kContinue);
   file.append(std::as_bytes(std::span(std::string_view("new"))));
-  EXPECT_EQ(content(target()), "old");
+  EXPECT_EQ(contentOf(target()), "old");
   file.commit();
-  EXPECT_EQ(content(target()), "new");
+  EXPECT_EQ(contentOf(target()), "new");
 }
 
 TEST_F(PartialFileTest, FollowsALinkToTheTarget) {
@@ -324,7 +317,7 @@ TEST_F(PartialFileTest, FollowsALinkToTheTarget) {
   EXPECT_TRUE(fs::exists(folder_ / "elsewhere/real.esvr.partial"));
   file.commit();
   EXPECT_TRUE(fs::is_symlink(target()));
-  EXPECT_EQ(content(target()), "new");
+  EXPECT_EQ(contentOf(target()), "new");
 }
 
 }  // namespace

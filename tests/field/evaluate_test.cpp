@@ -270,9 +270,13 @@ std::vector<Shape> shapesOf(const Field& field) {
 
 bool holds(const Shape& s, Coord v) {
   const double d[3] = {v.x - s.center[0], v.y - s.center[1], v.z - s.center[2]};
+  const double* row =
+      s.L.data();  // tests are not optimised, and each use of an array would be a call
   double m = 0.0;
-  for (std::size_t r = 0; r < 3; ++r)
-    m += std::pow(s.L[3 * r] * d[0] + s.L[3 * r + 1] * d[1] + s.L[3 * r + 2] * d[2], 2);
+  for (int r = 0; r < 3; ++r, row += 3) {
+    const double u = row[0] * d[0] + row[1] * d[1] + row[2] * d[2];
+    m += u * u;
+  }
   return m < s.cutoff;
 }
 

@@ -40,9 +40,11 @@ inline std::vector<Ellipsoid> randomEllipsoids(std::size_t n, double smallest, d
 /// m of an ellipsoid at a voxel: |L (v - mu)|^2.
 inline double squaredDistance(const Ellipsoid& p, Coord v) {
   const double d[3] = {v.x - p.center[0], v.y - p.center[1], v.z - p.center[2]};
+  const double* row =
+      p.L.data();  // tests are not optimised, and each use of an array would be a call
   double m = 0.0;
-  for (int r = 0; r < 3; ++r) {
-    const double u = p.L[3 * r] * d[0] + p.L[3 * r + 1] * d[1] + p.L[3 * r + 2] * d[2];
+  for (int r = 0; r < 3; ++r, row += 3) {
+    const double u = row[0] * d[0] + row[1] * d[1] + row[2] * d[2];
     m += u * u;
   }
   return m;

@@ -15,7 +15,6 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <sstream>
 
@@ -50,15 +49,10 @@ SplatScene someScene() {
   return scene;
 }
 
-std::string contentOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 std::string written(SplatForm form, const SplatScene& scene = someScene()) {
   const test::TemporaryFolder folder;
   writeSplats(folder / "out", scene, form);
-  return contentOf(folder / "out");
+  return test::contentOf(folder / "out");
 }
 
 TEST(WriteSplats, AreReadBackWithTheirPlaceInTheWorld) {

@@ -1,10 +1,11 @@
 #pragma once
-/// A folder of a test's own.
+/// Folders and files of a test's own.
 
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -42,5 +43,14 @@ class TemporaryFolder {
  private:
   std::filesystem::path path_;
 };
+
+/// The bytes of a file, or as many as it has when it is read.
+inline std::string contentOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes(file ? std::size_t(std::filesystem::file_size(path)) : 0, '\0');
+  file.read(bytes.data(), std::streamsize(bytes.size()));
+  bytes.resize(std::size_t(file.gcount()));
+  return bytes;
+}
 
 }  // namespace esvr::test

@@ -122,7 +122,7 @@ TEST(MeshDistance, SlowOfASphereThatMovedIsTheLengthOfItsMove) {
   const VolumeGrid sphere = gridOf({.voxelSize = 0.5f});
   EXPECT_EQ(meshDistance(sphere, sphere).voxels, 0.0);
   // Below and above the width within which voxels know their nearest polygon.
-  for (const double move : {1.0, 2.0, 6.0}) {
+  for (const double move : {1.0, 6.0}) {
     const VolumeGrid moved = gridOf({.voxelSize = 0.5f, .center = float(move)});
     for (const MeshDistance& distance :
          {meshDistance(sphere, moved), meshDistance(moved, sphere)}) {

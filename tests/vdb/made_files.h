@@ -21,6 +21,14 @@ inline std::filesystem::path dataDir() { return ESVR_DATA_DIR; }
 /// A float grid with one leaf of three active voxels, named "density".
 openvdb::FloatGrid::Ptr smallGrid(float background = 0.0f);
 
+/// A grid of a type that open_vdb.h does not name, such as Vec3IGrid, without a voxel. OpenVDB's registry makes it: the
+/// templates of a tree that is made here, with all virtual functions, are a tenth of this program.
+template <class Grid>
+typename Grid::Ptr registeredGrid() {
+  openvdb::initialize();
+  return openvdb::StaticPtrCast<Grid>(openvdb::GridBase::createGrid(Grid::TreeType::treeType()));
+}
+
 /// Writes with OpenVDB's own writer, by default with its default compression.
 void save(const std::filesystem::path& path, const openvdb::GridPtrVec& grids,
           const openvdb::MetaMap& metadata = {});

@@ -462,9 +462,9 @@ TEST_F(OtherPackedFile, OfACarriedGridIsReadFromItsBytes) {
 }
 
 TEST_F(OtherPackedFile, OfOtherTypesIsRefused) {
-  const auto places = openvdb::Vec3IGrid::create();
+  const auto places = test::registeredGrid<openvdb::Vec3IGrid>();
   places->setName("places");
-  places->getAccessor().setValue({0, 0, 0}, {1, 2, 3});
+  places->tree().setValue({0, 0, 0}, {1, 2, 3});
   test::save(path("in.vdb"), {places});
   EXPECT_THAT([&] { (void)readPacked(path("in.vdb"), "places"); },
               ThrowsMessage<BadInput>(HasSubstr("places")));

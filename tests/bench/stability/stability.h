@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -37,7 +36,7 @@ struct StabilityCase {
 
 [[nodiscard]] std::vector<StabilityCase> stabilityCases();
 
-// Gradients (measure_gradients.cpp).
+// Gradients.
 
 struct GradientErrors {
   /// Largest error of a derivative, divided by the sum of the magnitudes of the terms of the largest
@@ -52,14 +51,7 @@ struct GradientErrors {
 [[nodiscard]] GradientErrors measureGradients(const test::GradientCase& gradientCase,
                                               std::size_t crowd, const Device& device);
 
-/// The gradients of 1/2 sum r^2 on a GPU.
-/// \throws DeviceError  the build has no CUDA
-[[nodiscard]] std::vector<EllipsoidGradient> gradientsOnGpu(const FitTarget& target,
-                                                            const Kernel& kernel,
-                                                            std::span<const Ellipsoid> ellipsoids,
-                                                            const Device& device);
-
-// Fits (measure_fits.cpp).
+// Fits.
 
 /// A fit whose step sizes are a multiple of the tuned ones.
 struct FitRun {

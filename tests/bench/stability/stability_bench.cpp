@@ -3,7 +3,7 @@
 //     bench_stability OUT.json [--device cpu|cuda|cuda:N] [--machine TEXT] [--iterations N] [--only TEXT]
 //
 // TEXT of --machine describes the machine on the page. --only measures the cases whose names contain
-// TEXT. tests/bench/stability.py makes the page from these files.
+// TEXT. tests/bench/bench.py makes the page from these files.
 
 #include <cmath>
 #include <cstdio>

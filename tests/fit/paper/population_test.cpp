@@ -273,9 +273,13 @@ double largestAlong(const PaperEllipsoid& p, const KernelKind& kind, double y, d
   double largest = 0.0;
   for (double x = p.center[0] - kRayReach; x < p.center[0] + kRayReach; x += kStep) {
     const double d[3] = {x - p.center[0], y - p.center[1], z - p.center[2]};
+    const double* row =
+        unit.L.data();  // tests are not optimised, and each use of an array would be a call
     double m = 0.0;
-    for (int r = 0; r < 3; ++r)
-      m += std::pow(unit.L[3 * r] * d[0] + unit.L[3 * r + 1] * d[1] + unit.L[3 * r + 2] * d[2], 2);
+    for (int r = 0; r < 3; ++r, row += 3) {
+      const double u = row[0] * d[0] + row[1] * d[1] + row[2] * d[2];
+      m += u * u;
+    }
     largest = std::max(largest, kernelPhi(kernel, m));
   }
   return std::abs(p.intensity) * largest;

@@ -1,7 +1,8 @@
-#include "fuzz/repair.h"
+#include "fuzz/fuzzer.h"
 
 #include <algorithm>
 #include <cstring>
+#include <map>
 
 #include "format/bytes.h"
 #include "format/frame_table.h"
@@ -116,7 +117,21 @@ void repairTable(std::span<std::byte> file) {
   store(file, kTableChecksumAt, checksum(table));
 }
 
+std::map<std::string_view, Fuzzer>& table() {
+  static std::map<std::string_view, Fuzzer> all;  // fuzzers are added before main
+  return all;
+}
+
 }  // namespace
+
+bool addFuzzer(std::string_view name, Fuzzer fuzzer) {
+  return table().emplace(name, fuzzer).second;
+}
+
+Fuzzer findFuzzer(std::string_view name) {
+  const auto found = table().find(name);
+  return found == table().end() ? nullptr : found->second;
+}
 
 std::vector<std::byte> repaired(std::span<const std::byte> bytes) {
   std::vector<std::byte> file(bytes.begin(), bytes.end());

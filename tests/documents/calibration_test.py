@@ -1,5 +1,6 @@
 """Tests of calibration.py: FLIP, the measures and the statistics at values that are known. Nothing is rendered."""
 import math
+import pathlib
 import sys
 import unittest
 
@@ -9,7 +10,8 @@ except ModuleNotFoundError:
     print("python3-numpy is missing")
     sys.exit(77)
 
-import calibration
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
+import calibration  # noqa: the path must be known first
 
 
 def picture(red, green, blue, side=40):

@@ -1,6 +1,8 @@
-# Makes the man pages of ESVR_PROGRAMS (EsvrInstall.cmake) and ESVR_PYTHON_PROGRAMS (integrations/python)
-# from their own --help, and that of the format, esvr(5), from docs/format.md. Packages have compressed
-# pages.
+# What man and the shells know of the programs, which are ESVR_PROGRAMS (EsvrInstall.cmake) and ESVR_PYTHON_PROGRAMS
+# (integrations/python).
+
+# Their man pages are made from their own --help, and that of the format, esvr(5), from docs/format.md. Packages have
+# compressed pages.
 set(manPages)
 
 # esvr_man_file(<page> [COMPONENT <component>] COMMAND <command>... DEPENDS <files>...) makes a page in the
@@ -66,3 +68,26 @@ endif()
 if(manPages)
   add_custom_target(man ALL DEPENDS ${manPages})
 endif()
+
+# They are completed in bash and in zsh. bash loads the file that has the name of a program,
+# so that the file is installed with a link for each.
+set(completed ${ESVR_PROGRAMS} ${ESVR_PYTHON_PROGRAMS})
+list(JOIN completed " " ESVR_PROGRAM_NAMES)
+list(JOIN ESVR_COMPARE_COMMANDS " " ESVR_COMPARE_COMMAND_NAMES)
+set(completionFolder ${PROJECT_BINARY_DIR}/completion)
+file(MAKE_DIRECTORY ${completionFolder}/bash)
+configure_file(integrations/completion/esvr.bash.in ${completionFolder}/bash/esvr @ONLY)
+configure_file(integrations/completion/_esvr.in ${completionFolder}/_esvr @ONLY)
+foreach(program ${completed})
+  file(CREATE_LINK esvr ${completionFolder}/bash/${program} SYMBOLIC)
+endforeach()
+
+# Debian keeps the folder site-functions for what is not from a package.
+set(zshFolder site-functions)
+if(ESVR_DEB)
+  set(zshFolder vendor-completions)
+endif()
+install(DIRECTORY ${completionFolder}/bash/ COMPONENT programs
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
+install(FILES ${completionFolder}/_esvr COMPONENT programs
+        DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/${zshFolder})

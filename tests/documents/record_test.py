@@ -3,12 +3,14 @@ import copy
 import io
 import json
 import pathlib
+import sys
 import tempfile
 import types
 import unittest
 from contextlib import redirect_stdout
 
-import record
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "bench"))
+import record  # noqa: the path must be known first
 
 CASE = {"cpu": {"bytes": 10000, "user_seconds": 10.0, "seconds": 6.0, "memory": 5e7, "decode_seconds": 1.0,
                 "missed": False, "grids": {"density": {"psnr_box": 50.0, "psnr_active": 40.0, "psnr_t50": 35.0}}},
@@ -77,10 +79,13 @@ class Page(unittest.TestCase):
             folder = pathlib.Path(folder)
             (folder / "new.json").write_text(json.dumps(content(lambda case: case["cpu"].update(bytes=20000))))
             (folder / "old.json").write_text(json.dumps(content()))
+            (folder / "page.md").write_text("# What it is\n\n" + record.bench.MADE + "\nold figures\n")
             record.page(types.SimpleNamespace(record=folder / "new.json", before=folder / "old.json",
                                               page=folder / "page.md"))
             text = (folder / "page.md").read_text()
         self.assertIn("| smoke1 | default | 20,000 (+100.0 %) **worse** | 50.00 | 40.00 | 35.00 | 10.00 | 50 | 1.00 | 2.00 |", text)
+        self.assertTrue(text.startswith("# What it is\n"))
+        self.assertNotIn("old figures", text)
         self.assertIn("| smoke1 | default | 500 | 1000 | 60.00 |", text)
 
 

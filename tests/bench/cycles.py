@@ -1,6 +1,6 @@
 """Draws volumes with Cycles at densities that are given. calibration.py runs it in Blender:
 
-    blender --background --factory-startup --python calibration_pictures.py -- JOB.json
+    blender --background --factory-startup --python cycles.py -- JOB.json
 
 JOB.json has the `side` of the square pictures and a list of `pictures`. Each of these has a `volume`, a VDB file with a
 grid "density" and voxels of side 1, the `density` by which its values are multiplied, a `seed`, the `samples` of a pixel,
