@@ -4,7 +4,6 @@
 #include "compare/check.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iostream>
 #include <iterator>
 #include <memory>
@@ -51,15 +50,13 @@ cli::ProgramText checkText() {
           "  esvr-compare check REF CAND --baseline FILE.json [--update]",
       .notes =
           "REF and CAND may each be a .vdb, .nvdb or .esvr file, - for standard input, or a pipe. "
-          "Grids are compared and not the "
-          "bytes of files, because the bytes of a .vdb file differ whenever it is written. Voxels "
-          "are compared in index space. Different transforms, names, classes, value types, "
-          "backgrounds and metadata are listed, and the check fails if --fail-on names them. It "
-          "always fails if only one of the files has a grid, if a grid has become one of another "
-          "type, or if the bounding boxes of the active voxels of the two grids do not intersect. "
-          "Grids that are not of floats or doubles, and grids of the same bytes, are compared bit "
-          "for bit. --ignore-grids "
-          "excludes a grid from all of this.\n"
+          "Grids are compared and not the bytes of files, because the bytes of a .vdb file differ "
+          "whenever it is written. Voxels are compared in index space. Different transforms, "
+          "names, classes, value types, backgrounds and metadata are listed, and the check fails "
+          "if --fail-on names them. It always fails if only one of the files has a grid, if a grid "
+          "has become one of another type, or if the bounding boxes of the active voxels of the "
+          "two grids do not intersect. Grids that are not of floats or doubles, and grids of the "
+          "same bytes, are compared bit for bit. --ignore-grids excludes a grid from all of this.\n"
           "\n"
           "REF and CAND may both be sequences: a pattern such as smoke.####.vdb, or an .esvr file "
           "that holds a sequence. Each frame is compared, and 'temporal' is the PSNR of the change "
@@ -69,8 +66,7 @@ cli::ProgramText checkText() {
           "and keeps the tolerances of the file.\n"
           "\n"
           "Exit codes: 0 within all limits, 1 failure, 2 wrong options, 3 unusable input or a grid "
-          "that cannot be compared, 4 a "
-          "limit was missed, 5 not enough memory (--max-memory).",
+          "that cannot be compared, 4 a limit was missed, 5 not enough memory (--max-memory).",
       .examples =
           "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45 --min-iou 0.98\n"
           "  esvr-compare check smoke.vdb back.vdb --max-error 1% --fail-on transform,metadata\n"
@@ -159,9 +155,8 @@ std::optional<CheckOptions> parseCheckOptions(int argc, const char* const* argv)
   options.inputs = a.inputs;
   options.reference = a.get<std::string>("reference");
   options.candidate = a.get<std::string>("candidate");
-  options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
-  if (const auto names = a.find<std::vector<std::string>>("ignore-grids"))
-    options.ignored = {names->begin(), names->end()};
+  options.grids = a.all("grid");
+  for (const std::string& name : a.all("ignore-grids")) options.ignored.insert(name);
   readLimits(a, options);
   if (const auto range = a.find<std::string>("frames"))
     options.frames = cli::parseFrames("frames", *range);
@@ -332,8 +327,7 @@ void printCheck(const CheckRecord& record, std::ostream& out) {
 Json toJson(const std::vector<Difference>& differences) {
   Json list = Json::array();
   for (const auto& d : differences)
-    for (const auto& [name, kind] : kDifferenceNames)
-      if (kind == d.kind) list.push_back({{"kind", name}, {"text", d.text}});
+    list.push_back({{"kind", cli::wordOf(d.kind, kDifferenceNames)}, {"text", d.text}});
   return list;
 }
 
@@ -341,7 +335,7 @@ Json toJson(const CheckedGrid& grid) {
   Json json{{"name", grid.name}, {"candidate_name", grid.candidateName}};
   for (const Figure& figure : allFigures()) {
     const auto value = valueOf(grid.figures, figure);
-    if (value) json[figure.key] = std::isfinite(*value) ? Json(*value) : Json();
+    if (value) json[figure.key] = finiteOrNull(*value);
   }
   const Coord at = grid.metrics.maxErrorAt;
   json["frame"] = grid.frame ? Json(*grid.frame) : Json(nullptr);

@@ -375,7 +375,7 @@ class Comparison {
     else if (haveSameBytes(both) && !(temporal_ && hasFigures(both)))
       addSame(both, record);
     else
-      measure(pair, both, record);
+      measure(both, record);
   }
 
  private:
@@ -388,8 +388,7 @@ class Comparison {
   /// Two grids of the same bytes are equal, whatever their values, and need not be read.
   void addSame(const GridPair& both, CheckRecord& record) const {
     if (!hasFigures(both)) {
-      record.same.push_back("grid \"" + both.a().uniqueName + "\": the same bytes (" +
-                            both.a().valueType + ")");
+      record.same.push_back(lineOf(both) + "the same bytes (" + both.a().valueType + ")");
       return;
     }
     CheckedGrid grid{.name = both.a().uniqueName, .candidateName = both.b().uniqueName};
@@ -408,23 +407,21 @@ class Comparison {
 
   /// A grid that cannot be measured, because a value is not finite for example, does not keep the
   /// others from being compared.
-  void measure(const Pair& pair, const GridPair& both, CheckRecord& record) {
-    const std::string& name = both.a().uniqueName;
-    try {
-      if (both.a().isVector)
-        compareVectorGrids(pair, name, record);
-      else
-        record.grids.push_back(compare(pair, name, record));
-    } catch (const BadInput& why) {
-      record.unreadable.push_back("grid \"" + name + "\" cannot be compared: " + why.what());
-    }
+  void measure(const GridPair& both, CheckRecord& record) try {
+    if (both.a().isVector)
+      compareVectorGrids(both, record);
+    else
+      record.grids.push_back(compare(both, record));
+  } catch (const BadInput& why) {
+    record.unreadable.push_back("grid \"" + both.a().uniqueName +
+                                "\" cannot be compared: " + why.what());
   }
 
-  CheckedGrid compare(const Pair& pair, const std::string& name, CheckRecord& record) {
-    const VolumeGrid a = reference_.read(pair.reference);
-    const VolumeGrid b = candidate_.read(*pair.candidate);
-    CheckedGrid grid{.name = name, .candidateName = candidate_.grids()[*pair.candidate].uniqueName};
-    requireOverlap(a.volume, b.volume, name, record);
+  CheckedGrid compare(const GridPair& both, CheckRecord& record) {
+    const VolumeGrid a = both.reference.read(both.ofReference);
+    const VolumeGrid b = both.candidate.read(both.ofCandidate);
+    CheckedGrid grid{.name = both.a().uniqueName, .candidateName = both.b().uniqueName};
+    requireOverlap(both, a.volume, b.volume, record);
     grid.metrics =
         compareVolumes(a.volume, b.volume,
                        {.box = options_.box,
@@ -442,17 +439,16 @@ class Comparison {
   }
 
   /// Adds a row for the lengths of the vectors and one for each component.
-  void compareVectorGrids(const Pair& pair, const std::string& name, CheckRecord& record) {
-    const VectorGrid a = reference_.readVectors(pair.reference);
-    const VectorGrid b = candidate_.readVectors(*pair.candidate);
-    const std::string& other = candidate_.grids()[*pair.candidate].uniqueName;
+  void compareVectorGrids(const GridPair& both, CheckRecord& record) {
+    const VectorGrid a = both.reference.readVectors(both.ofReference);
+    const VectorGrid b = both.candidate.readVectors(both.ofCandidate);
     const SparseVolume lengths = magnitudeOf(a.components), others = magnitudeOf(b.components);
-    requireOverlap(lengths, others, name, record);
+    requireOverlap(both, lengths, others, record);
     const VectorMetrics metrics = compareVectors(
         a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
     const double range = valueRangeOfVectors(a.components), peak = metrics.magnitude.peak;
-    record.grids.push_back({.name = name,
-                            .candidateName = other,
+    record.grids.push_back({.name = both.a().uniqueName,
+                            .candidateName = both.b().uniqueName,
                             .metrics = metrics.magnitude,
                             .figures = figuresOf(metrics.magnitude),
                             .differences = compareDescriptors(a.descriptor, b.descriptor),
@@ -462,8 +458,8 @@ class Comparison {
     addTemporal(record.grids.back(), {lengths, others, peak});
     for (std::size_t c = 0; c < kComponents; ++c) {
       const VolumeMetrics& m = metrics.components[c];
-      record.grids.push_back({.name = reference_.names().ofComponent(pair.reference, c),
-                              .candidateName = candidate_.names().ofComponent(*pair.candidate, c),
+      record.grids.push_back({.name = reference_.names().ofComponent(both.ofReference, c),
+                              .candidateName = candidate_.names().ofComponent(both.ofCandidate, c),
                               .metrics = m,
                               .figures = figuresOf(m),
                               .differences = backgroundDifferences(a, b, c),
@@ -513,12 +509,10 @@ class Comparison {
       grid.figures[std::size_t(FigureId::kPsnrTemporal)] = temporal_->compare(grid.name, volumes);
   }
 
-  static void requireOverlap(const SparseVolume& a, const SparseVolume& b, const std::string& name,
+  static void requireOverlap(const GridPair& both, const SparseVolume& a, const SparseVolume& b,
                              CheckRecord& record) {
-    const Box boxA = activeBox(a), boxB = activeBox(b);
-    const Box common{maxCoord(boxA.min, boxB.min), minCoord(boxA.max, boxB.max)};
-    if (!common.empty()) return;
-    record.failures.push_back("grid \"" + name + "\": " +
+    if (!common(activeBox(a), activeBox(b)).empty()) return;
+    record.failures.push_back(lineOf(both) +
                               (activeVoxelCount(b) == 0
                                    ? "the candidate has no active voxel"
                                    : "the active voxels lie in boxes that do not meet"));

@@ -50,14 +50,13 @@ cli::ProgramText curvesText() {
           ".esvr files and for VDB and ZFP files of the same sizes.",
       .usage = "  esvr-compare curves REF.vdb [CAND.esvr ...] --output PREFIX [--fit BYTES]...",
       .notes =
-          "The program writes every point to PREFIX.csv and PREFIX.json. The page PREFIX.html "
-          "has the charts: error over bytes, error over run time if this run makes fits, and "
-          "pictures per second over bytes with --fps.\n"
+          "The program writes every point to PREFIX.csv and PREFIX.json. The page PREFIX.html has "
+          "the charts: error over bytes, error over run time if this run makes fits, and pictures "
+          "per second over bytes with --fps.\n"
           "\n"
           "Without CAND and --fit, the program fits ellipsoids for six sizes: the size of the "
           "half-float Blosc VDB divided by 10, 20, 50, 100, 200 and 400. The chart over run time "
-          "has the "
-          "time of the optimisation, and the whole time from the voxels to the file.\n"
+          "has the time of the optimisation, and the whole time from the voxels to the file.\n"
           "\n"
           "Exit codes: 0 done, 1 failure or interrupted (finished points are written), 2 wrong "
           "options, 3 unusable input, 5 no such device or not enough memory (--max-memory).",
@@ -105,9 +104,7 @@ std::optional<CurvesOptions> parseCurvesOptions(int argc, const char* const* arg
   TableOptions& table = options.table;
   readSceneOptions(a, table);
   table.matched = table.zfp = !a.get<bool>("no-baselines");
-  for (const auto& text :
-       a.find<std::vector<std::string>>("fit").value_or(std::vector<std::string>{}))
-    table.fits.push_back(cli::parseByteSize("fit", text));
+  for (const auto& text : a.all("fit")) table.fits.push_back(cli::parseByteSize("fit", text));
   table.runs = 1;
   readSpeed(a, table);
   table.commandLine = commandLine(argc, argv);
@@ -161,11 +158,7 @@ class CurvesRun {
     log_.warning("no fit of " + std::to_string(bytes) + " bytes: " + error.what());
   }
 
-  void add(TableRow row) {
-    if (scene_.cancel.cancelled()) throw Cancelled();
-    log_.detail("made " + row.group + ": " + row.name);
-    record_.rows.push_back(std::move(row));
-  }
+  void add(TableRow row) { addRow(scene_, log_, std::move(row), record_); }
 
   const TableScene& scene_;
   TableRecord& record_;
@@ -325,9 +318,7 @@ std::string curvesPage(const TableOptions& options, const TableRecord& record,
                        const DataTable& data) {
   Html charts;
   for (const Chart& chart : curveCharts(record)) charts += report::toHtml(chart);
-  report::HtmlPage page;
-  page.title = options.reference.filename().string();
-  page.finding = findingOf(record);
+  report::HtmlPage page = pageOf(options, record);
   page.paragraphs = {sceneLine(record) + ".", page.finding.empty() ? "" : rivalRule(),
                      interruption(record)};
   FigureTable files = pointsOf(kFilePoint, data);
@@ -338,8 +329,6 @@ std::string curvesPage(const TableOptions& options, const TableRecord& record,
   page.sections = {
       report::section("", "Curves", report::element("div", {{"class", "charts"}}, charts)),
       duelSection(duelsOf(record), record), report::section("figures", "Points", tables)};
-  page.commands = versionLines();
-  page.commands.insert(page.commands.begin(), joined(options.commandLine));
   return report::toHtml(page);
 }
 
@@ -352,12 +341,7 @@ Json toJson(const DataTable& table) {
   Json points = Json::array();
   for (const auto& row : table.rows) {
     Json point = Json::object();
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      const auto& key = table.columns[i].key;
-      if (const auto* text = std::get_if<std::string>(&row[i])) point[key] = *text;
-      if (const auto* value = std::get_if<double>(&row[i]))
-        point[key] = std::isfinite(*value) ? Json(*value) : Json();
-    }
+    for (std::size_t i = 0; i < row.size(); ++i) addCell(table.columns[i], row[i], point);
     points.push_back(std::move(point));
   }
   return points;

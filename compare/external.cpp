@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -307,12 +306,6 @@ void deactivate(SparseVolume& volume, float threshold) {
 
 }  // namespace
 
-std::string boundText(double bound) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), bound).ptr;
-  return {text.data(), end};
-}
-
 ExternalCommand parseExternalCommand(const std::string& text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
@@ -337,8 +330,9 @@ void ExternalCodec::run(const char* job, const std::filesystem::path& from,
   std::filesystem::remove(to);
   const Coord side = sideOf(source_.box);
   std::string line = command_.command + " " + job;
-  for (const auto& word : {from.string(), to.string(), std::to_string(side.x),
-                           std::to_string(side.y), std::to_string(side.z), boundText(bound_)})
+  for (const auto& word :
+       {from.string(), to.string(), std::to_string(side.x), std::to_string(side.y),
+        std::to_string(side.z), cli::exactNumber(bound_)})
     line += " " + cli::shellWord(word);
   runCommand(line, kOption);
   if (!std::filesystem::exists(to))

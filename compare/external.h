@@ -111,9 +111,6 @@ class ExternalCodec {
   double bound_ = 0.0;
 };
 
-/// The text of a bound, without loss of digits.
-[[nodiscard]] std::string boundText(double bound);
-
 /// One trial of a search.
 struct ExternalStep {
   double bound = 0.0;

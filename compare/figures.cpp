@@ -9,116 +9,59 @@
 namespace esvr::compare {
 namespace {
 
-constexpr std::array<Figure, kFigureCount> kFigures{{
-    {FigureId::kPsnrActive,
-     "psnr_active",
-     "min-psnr-active",
-     "PSNR active",
-     "smallest PSNR over the active voxels, dB",
-     true,
-     false,
-     {.absolute = 0.05}},
-    {FigureId::kPsnrBox,
-     "psnr_box",
-     "min-psnr",
-     "PSNR box",
-     "smallest PSNR over the box, dB",
-     true,
-     false,
-     {.absolute = 0.05}},
-    {FigureId::kPsnrT90,
-     "psnr_t90",
-     "min-psnr-t90",
-     "PSNR T 0.9",
-     "of grids that are looked through: smallest PSNR of the transmittance, where the median "
-     "column lets 90 % of the light through, dB",
-     true,
-     false,
-     {.absolute = 0.05}},
-    {FigureId::kPsnrT50,
-     "psnr_t50",
-     "min-psnr-t50",
-     "PSNR T 0.5",
-     "the same where it lets 50 % of the light through, dB",
-     true,
-     false,
-     {.absolute = 0.05}},
-    {FigureId::kPsnrT10,
-     "psnr_t10",
-     "min-psnr-t10",
-     "PSNR T 0.1",
-     "the same where it lets 10 % of the light through, dB",
-     true,
-     false,
-     {.absolute = 0.05}},
-    {FigureId::kPsnrTemporal,
-     "psnr_temporal",
-     "min-psnr-temporal",
-     "temporal",
-     "of sequences: smallest PSNR of the temporal difference, which is each frame minus the frame "
-     "before it, dB",
-     true,
-     false,
-     {.absolute = 0.05}},
-    {FigureId::kMaxError,
-     "max_error",
-     "max-error",
-     "max error",
-     "largest error of a voxel: 0.02, or 1% of the reference's range",
-     false,
-     true,
-     {.relative = 0.02}},
-    {FigureId::kRelativeError,
-     "relative_error",
-     "max-relative-error",
-     "relative error",
-     "largest error relative to the value of each voxel: 1%, or 1%,0.001 if it may be as large as "
-     "for "
-     "0.001 where values are smaller; measured if there is a limit on it",
-     false,
-     false,
-     {.relative = 0.02}},
-    {FigureId::kP999Error,
-     "p999_error",
-     "max-p999-error",
-     "p99.9 error",
-     "largest 99.9th percentile of the error: 0.01, or 0.5% of the reference's range",
-     false,
-     true,
-     {.relative = 0.02}},
-    {FigureId::kIou,
-     "iou",
-     "min-iou",
-     "IoU",
-     "smallest overlap (intersection over union) of the active voxels, 0 to 1",
-     true,
-     false,
-     {.absolute = 0.002}},
-    {FigureId::kSsim,
-     "ssim",
-     "min-ssim",
-     "SSIM",
-     "smallest 3D SSIM over the box",
-     true,
-     false,
-     {.absolute = 0.002}},
-    {FigureId::kMassError,
-     "mass_error",
-     "max-mass-error",
-     "mass error",
-     "largest relative error of the sum of (value - background)",
-     false,
-     false,
-     {.absolute = 0.001}},
-    {FigureId::kMeshDistance,
-     "mesh_distance",
-     "max-mesh-distance",
-     "mesh distance",
-     "of level sets: largest Hausdorff distance of the meshes of the zero crossings, in voxels",
-     false,
-     false,
-     {.absolute = 0.01}},
-}};
+/// A PSNR, of which 0.05 dB less than in a baseline are tolerated.
+constexpr Figure psnrFigure(FigureId id, const char* key, const char* option, const char* header,
+                            const char* unit) {
+  return {id, key, option, header, unit, true, false, {.absolute = 0.05}};
+}
+
+/// A share, which is better if it is higher.
+constexpr Figure shareFigure(FigureId id, const char* key, const char* option, const char* header,
+                             const char* unit) {
+  return {id, key, option, header, unit, true, false, {.absolute = 0.002}};
+}
+
+/// An error, of which a limit may be in units of the values.
+constexpr Figure errorFigure(FigureId id, const char* key, const char* option, const char* header,
+                             const char* unit, Slack slack, bool inValueUnits = false) {
+  return {id, key, option, header, unit, false, inValueUnits, slack};
+}
+
+constexpr std::array<Figure, kFigureCount> kFigures{
+    psnrFigure(FigureId::kPsnrActive, "psnr_active", "min-psnr-active", "PSNR active",
+               "smallest PSNR over the active voxels, dB"),
+    psnrFigure(FigureId::kPsnrBox, "psnr_box", "min-psnr", "PSNR box",
+               "smallest PSNR over the box, dB"),
+    psnrFigure(FigureId::kPsnrT90, "psnr_t90", "min-psnr-t90", "PSNR T 0.9",
+               "of grids that are looked through: smallest PSNR of the transmittance, where "
+               "the median column lets 90 % of the light through, dB"),
+    psnrFigure(FigureId::kPsnrT50, "psnr_t50", "min-psnr-t50", "PSNR T 0.5",
+               "the same where it lets 50 % of the light through, dB"),
+    psnrFigure(FigureId::kPsnrT10, "psnr_t10", "min-psnr-t10", "PSNR T 0.1",
+               "the same where it lets 10 % of the light through, dB"),
+    psnrFigure(FigureId::kPsnrTemporal, "psnr_temporal", "min-psnr-temporal", "temporal",
+               "of sequences: smallest PSNR of the temporal difference, which is each frame "
+               "minus the frame before it, dB"),
+    errorFigure(FigureId::kMaxError, "max_error", "max-error", "max error",
+                "largest error of a voxel: 0.02, or 1% of the reference's range",
+                {.relative = 0.02}, true),
+    errorFigure(FigureId::kRelativeError, "relative_error", "max-relative-error", "relative error",
+                "largest error relative to the value of each voxel: 1%, or 1%,0.001 if it may "
+                "be as large as for 0.001 where values are smaller; measured if there is a "
+                "limit on it",
+                {.relative = 0.02}),
+    errorFigure(FigureId::kP999Error, "p999_error", "max-p999-error", "p99.9 error",
+                "largest 99.9th percentile of the error: 0.01, or 0.5% of the reference's range",
+                {.relative = 0.02}, true),
+    shareFigure(FigureId::kIou, "iou", "min-iou", "IoU",
+                "smallest overlap (intersection over union) of the active voxels, 0 to 1"),
+    shareFigure(FigureId::kSsim, "ssim", "min-ssim", "SSIM", "smallest 3D SSIM over the box"),
+    errorFigure(FigureId::kMassError, "mass_error", "max-mass-error", "mass error",
+                "largest relative error of the sum of (value - background)", {.absolute = 0.001}),
+    errorFigure(FigureId::kMeshDistance, "mesh_distance", "max-mesh-distance", "mesh distance",
+                "of level sets: largest Hausdorff distance of the meshes of the zero "
+                "crossings, in voxels",
+                {.absolute = 0.01})};
 
 bool isPsnr(const Figure& figure) { return std::string_view(figure.key).starts_with("psnr_"); }
 

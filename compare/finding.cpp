@@ -1,11 +1,10 @@
 #include "compare/finding.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "programs/data_table.h"
+#include "programs/messages.h"
 
 namespace esvr::compare {
 
@@ -57,12 +56,7 @@ using report::bytesText;
 
 constexpr double kVisible = 0.05;  // dB; smaller differences are 0.0 in a sentence
 
-/// A number with one decimal.
-std::string oneDecimal(double value) {
-  std::array<char, 64> text;
-  std::snprintf(text.data(), text.size(), "%.1f", value);
-  return text.data();
-}
+std::string oneDecimal(double value) { return cli::formatted("%.1f", value); }
 std::string decibels(double value) { return oneDecimal(value) + " dB"; }
 
 std::string bestRivalName(const Duel& duel) { return "the best rival, " + duel.rival->name; }

@@ -109,19 +109,21 @@ bool GridFile::hasBytes(std::size_t g) const {
 std::optional<CarriedGrid> GridFile::bytesOf(std::size_t g) const {
   if (!hasBytes(g)) return std::nullopt;
   if (esvr_) return esvr_->carried[grids_[g].ofEsvr.index];
-  auto grids = readCarried(
-      path_, {&g, 1},
-      {.maxBytes = memory_.maxBytes, .memory = memory_.voxels, .directory = directory_});
+  auto grids = readCarried(path_, {&g, 1}, reading());
   return ofSameFile(std::move(grids.front()));
 }
 
+ReadOptions GridFile::reading() const {
+  return {.nonFinite = NonFinite::kKeep,
+          .maxBytes = memory_.maxBytes,
+          .memory = memory_.voxels,
+          .volumes = kVolumes,
+          .directory = directory_};
+}
+
 VolumeGrid GridFile::read(std::size_t g) const {
-  const ReadOptions options{.nonFinite = NonFinite::kKeep,
-                            .allowEmpty = true,
-                            .maxBytes = memory_.maxBytes,
-                            .memory = memory_.voxels,
-                            .volumes = kVolumes,
-                            .directory = directory_};
+  ReadOptions options = reading();
+  options.allowEmpty = true;
   if (!esvr_) return ofSameFile(readGrid(path_, g, options));
   const GridOfFile& place = grids_[g].ofEsvr;
   if (place.isCarried) return readGrid(esvr_->carried[place.index], options);
@@ -133,14 +135,9 @@ VolumeGrid GridFile::read(std::size_t g) const {
 }
 
 VectorGrid GridFile::readVectors(std::size_t g) const {
-  const ReadOptions options{.nonFinite = NonFinite::kKeep,
-                            .maxBytes = memory_.maxBytes,
-                            .memory = memory_.voxels,
-                            .volumes = kVolumes,
-                            .directory = directory_};
-  if (!esvr_) return ofSameFile(readVector(path_, g, options));
+  if (!esvr_) return ofSameFile(readVector(path_, g, reading()));
   const GridOfFile& place = grids_[g].ofEsvr;
-  if (place.isCarried) return readVector(esvr_->carried[place.index], options);
+  if (place.isCarried) return readVector(esvr_->carried[place.index], reading());
   const StoredVector& vector = esvr_->vectors.at(place.index);
   return decodeVector(vector.name, componentsOf(*esvr_, vector),
                       {.maxBytes = memory_.maxBytes, .memory = memory_.voxels});

@@ -66,6 +66,7 @@ class GridFile {
   [[nodiscard]] VectorGrid readVectors(std::size_t grid) const;
 
  private:
+  [[nodiscard]] ReadOptions reading() const;
   void listEsvr();
   void listVdb();
   void nameGrids();

@@ -5,6 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "compare/options.h"
 #include "esvr/error.h"
 #include "programs/files.h"
 #include "programs/messages.h"
@@ -151,9 +152,6 @@ void judgeSize(const std::filesystem::path& path, const Json& baseline, CheckRec
        record);
 }
 
-/// A number, or null if it is infinite, since JSON has no infinity.
-Json numberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
-
 double toleranceOf(const Json& old, const char* key, double fallback) {
   if (!old.is_object() || !old.contains(key)) return fallback;
   const Json& entry = old[key];
@@ -169,7 +167,7 @@ Json gridEntry(const CheckedGrid& grid, const Json& old) {
     if (!value) continue;
     const double scale = std::isfinite(*value) ? std::abs(*value) : 0.0;
     const double slack = figure.slack.absolute + figure.slack.relative * scale;
-    json[figure.key] = {{"value", numberOrNull(*value)},
+    json[figure.key] = {{"value", finiteOrNull(*value)},
                         {"tolerance", toleranceOf(old, figure.key, slack)}};
   }
   return json;

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "compare/figures.h"
+#include "compare/options.h"
+#include "compare/table.h"
 #include "programs/data_table.h"
 #include "programs/messages.h"
 #include "programs/page.h"
@@ -207,6 +210,19 @@ DataTable dataTable(const TableRecord& record, std::span<const TableRow> rows) {
   for (const auto& column : tableColumns()) table.columns.push_back(column.column);
   for (const auto& row : rows) table.rows.push_back(cellsOf(row, record));
   return table;
+}
+
+void addCell(const report::Column& column, const Cell& cell, nlohmann::ordered_json& json) {
+  if (const auto* text = std::get_if<std::string>(&cell)) json[column.key] = *text;
+  if (const auto* value = std::get_if<double>(&cell)) json[column.key] = finiteOrNull(*value);
+}
+
+report::HtmlPage pageOf(const TableOptions& options, const TableRecord& record) {
+  report::HtmlPage page{.title = options.reference.filename().string(),
+                        .finding = findingOf(record),
+                        .commands = versionLines()};
+  page.commands.insert(page.commands.begin(), joined(options.commandLine));
+  return page;
 }
 
 DataTable withoutEmptyColumns(const DataTable& table) {

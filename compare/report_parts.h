@@ -2,6 +2,7 @@
 /// What the reports of `table` and `curves` are made of: columns, sentences, tables of duels and
 /// charts of errors.
 
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -47,6 +48,12 @@ struct TableColumn {
 /// The rows with all columns.
 [[nodiscard]] report::DataTable dataTable(const TableRecord& record,
                                           std::span<const TableRow> rows);
+
+/// Adds a cell to an object of JSON; an empty one is left out.
+void addCell(const report::Column& column, const report::Cell& cell, nlohmann::ordered_json& json);
+
+/// A page with its title, its finding, and the command and the versions that made it.
+[[nodiscard]] report::HtmlPage pageOf(const TableOptions& options, const TableRecord& record);
 
 /// The columns for which at least one row has a figure.
 [[nodiscard]] report::DataTable withoutEmptyColumns(const report::DataTable& table);

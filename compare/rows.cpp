@@ -15,6 +15,7 @@
 #include "programs/memory.h"
 #include "programs/messages.h"
 #include "programs/names.h"
+#include "programs/option_values.h"
 #include "programs/run_main.h"
 
 namespace esvr::compare {
@@ -93,35 +94,19 @@ TableRecord SceneFiles::record() const {
 namespace {
 
 const char* nameOf(PackedForm form) {
-  switch (form) {
-    case PackedForm::kOpenVdbFloat:
-      return "OpenVDB float";
-    case PackedForm::kOpenVdbHalf:
-      return "OpenVDB half";
-    case PackedForm::kNanoFloat:
-      return "NanoVDB float";
-    case PackedForm::kNanoFp16:
-      return "NanoVDB Fp16";
-    case PackedForm::kNanoFp8:
-      return "NanoVDB Fp8";
-    case PackedForm::kNanoFp4:
-      return "NanoVDB Fp4";
-    case PackedForm::kNanoFpN:
-      break;
-  }
-  return "NanoVDB FpN";
+  return cli::wordOf(form, {{"OpenVDB float", PackedForm::kOpenVdbFloat},
+                            {"OpenVDB half", PackedForm::kOpenVdbHalf},
+                            {"NanoVDB float", PackedForm::kNanoFloat},
+                            {"NanoVDB Fp16", PackedForm::kNanoFp16},
+                            {"NanoVDB Fp8", PackedForm::kNanoFp8},
+                            {"NanoVDB Fp4", PackedForm::kNanoFp4},
+                            {"NanoVDB FpN", PackedForm::kNanoFpN}});
 }
 
 const char* nameOf(PackedCodec codec) {
-  switch (codec) {
-    case PackedCodec::kZip:
-      return " Zip";
-    case PackedCodec::kBlosc:
-      return " Blosc";
-    case PackedCodec::kNone:
-      break;
-  }
-  return " raw";
+  return cli::wordOf(
+      codec,
+      {{" Zip", PackedCodec::kZip}, {" Blosc", PackedCodec::kBlosc}, {" raw", PackedCodec::kNone}});
 }
 
 }  // namespace
@@ -225,7 +210,7 @@ Timing timed(int runs, const Run& run) {
 
 Timing once(double seconds) { return {seconds, seconds, seconds, 1}; }
 
-std::string settingOf(double bound) { return "bound=" + boundText(bound); }
+std::string settingOf(double bound) { return "bound=" + cli::exactNumber(bound); }
 
 SearchStep stepOf(std::string setting, std::uint64_t bytes, double psnr) {
   return {std::move(setting), bytes, std::isnan(psnr) ? std::nullopt : std::optional(psnr)};
@@ -243,8 +228,7 @@ StoredGrid gridOf(EsvrFile file, const std::filesystem::path& path, const std::s
 }
 
 void requireOverlap(const std::filesystem::path& path, const Box& a, const Box& b) {
-  const Box common{maxCoord(a.min, b.min), minCoord(a.max, b.max)};
-  if (!b.empty() && common.empty())
+  if (!b.empty() && common(a, b).empty())
     throw BadInput(path.string() +
                    ": its active voxels and the reference's lie in boxes that do not meet");
 }
@@ -514,6 +498,12 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   measureEsvr(path, row);
   row.memory = std::max(row.memory, memory);
   return row;
+}
+
+void addRow(const TableScene& scene, const cli::Log& log, TableRow row, TableRecord& record) {
+  if (scene.cancel.cancelled()) throw Cancelled();
+  log.detail("made " + row.group + ": " + row.name);
+  record.rows.push_back(std::move(row));
 }
 
 void requireAllRows(const TableRecord& record) {

@@ -139,6 +139,9 @@ class RowMaker {
   BaselineEncoder encoder_;
 };
 
+/// Adds a row that was made. \throws Cancelled  the run was interrupted meanwhile
+void addRow(const TableScene& scene, const cli::Log& log, TableRow row, TableRecord& record);
+
 /// \throws RuntimeFailure  the run was interrupted; the text has the number of rows
 void requireAllRows(const TableRecord& record);
 

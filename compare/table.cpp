@@ -44,9 +44,7 @@ void addSceneOptions(cli::CommandLine& line) {
 void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
   options.inputs = a.inputs;
   options.reference = a.get<std::string>("reference");
-  for (const auto& candidate :
-       a.find<std::vector<std::string>>("candidates").value_or(std::vector<std::string>{}))
-    options.candidates.emplace_back(candidate);
+  for (const auto& candidate : a.all("candidates")) options.candidates.emplace_back(candidate);
   options.grid = a.find<std::string>("grid");
   options.box = boxOption(a);
   options.peak = peakOption(a);
@@ -139,8 +137,7 @@ cli::CommandLine tableLine() {
     ("runs", value<int>()->value_name("N")->default_value(TableOptions{}.runs),
      "number of runs; times are their medians")
     ("images", value<int>()->value_name("N"),
-     "draw pictures of each row from N views of a full turn, and compare them with the "
-     "reference's")
+     "draw pictures of each row from N views of a full turn, and compare them with the reference's")
     ("image-size", value<int>()->value_name("PX")->default_value(GalleryOptions{}.resolution.width),
      "width and height of a picture in pixels")
     ("image-step", value<double>()->value_name("S")->default_value(GalleryOptions{}.step),
@@ -174,22 +171,20 @@ void readRows(const cli::Arguments& a, TableOptions& options) {
     else if (word != "none")
       cli::refuseWord("rows", word, {"lossless", "quantised", "matched", "zfp", "none"});
   }
-  for (const auto& text : a.find<Words>("row").value_or(Words{}))
-    options.settings.push_back(parseBaseline(text));
+  for (const auto& text : a.all("row")) options.settings.push_back(parseBaseline(text));
 }
 
 std::vector<double> psnrs(const cli::Arguments& a, const std::string& option) {
-  const auto found = a.find<std::vector<double>>(option).value_or(std::vector<double>{});
+  const auto found = a.all<double>(option);
   for (const double psnr : found) cli::requireRange(option, psnr, 0.0, kMaxPsnr);
   return found;
 }
 
 void readSizes(const cli::Arguments& a, TableOptions& options) {
-  for (const auto& text : a.find<Words>("size").value_or(Words{}))
-    options.sizes.push_back(cli::parseByteSize("size", text));
+  for (const auto& text : a.all("size")) options.sizes.push_back(cli::parseByteSize("size", text));
   options.psnrs = psnrs(a, "psnr");
   options.activePsnrs = psnrs(a, "psnr-active");
-  for (const auto& text : a.find<Words>("fit").value_or(Words{})) {
+  for (const auto& text : a.all("fit")) {
     if (text == "default")
       options.fitDefault = true;
     else if (text == "paper")
@@ -201,7 +196,7 @@ void readSizes(const cli::Arguments& a, TableOptions& options) {
 
 /// \pre the candidates and the sizes were read
 void readCommands(const cli::Arguments& a, TableOptions& options) {
-  for (const auto& text : a.find<Words>("external-command").value_or(Words{}))
+  for (const auto& text : a.all("external-command"))
     options.commands.push_back(parseExternalCommand(text));
   const bool hasAim = !options.candidates.empty() || !options.sizes.empty() ||
                       !options.psnrs.empty() || !options.activePsnrs.empty() ||
@@ -209,8 +204,7 @@ void readCommands(const cli::Arguments& a, TableOptions& options) {
   if (!options.commands.empty() && !hasAim)
     throw UsageError(
         "--external-command needs a size or a PSNR to match: CAND, --size, --psnr, --psnr-active "
-        "or "
-        "--fit");
+        "or --fit");
 }
 
 /// Reads a text like "viridis" or "viridis:tent".
@@ -224,10 +218,8 @@ void readImages(const cli::Arguments& a, TableOptions& options) {
   constexpr int kMaxViews = 360, kMaxPixels = 4096;
   constexpr double kMinStep = 1e-3, kMaxStep = 1e3;
   GalleryOptions& images = options.images;
-  for (const auto& text : a.find<Words>("colors").value_or(Words{}))
-    images.transfers.push_back(builtInTransfer(text));
-  for (const auto& file : a.find<Words>("tf").value_or(Words{}))
-    images.transfers.push_back({file, readParaViewPreset(file)});
+  for (const auto& text : a.all("colors")) images.transfers.push_back(builtInTransfer(text));
+  for (const auto& file : a.all("tf")) images.transfers.push_back({file, readParaViewPreset(file)});
   images.lpips = a.find<std::string>("lpips").value_or("");
   if (!a.has("images")) {
     if (!images.transfers.empty() || !images.lpips.empty())
@@ -260,8 +252,7 @@ std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv)
   readSceneOptions(a, options);
   readRows(a, options);
   readSizes(a, options);
-  for (const auto& text : a.find<Words>("external").value_or(Words{}))
-    options.externals.push_back(parseExternal(text));
+  for (const auto& text : a.all("external")) options.externals.push_back(parseExternal(text));
   readCommands(a, options);
   options.runs = a.get<int>("runs");
   cli::requireRange("runs", options.runs, 1, kMaxRuns);
@@ -283,9 +274,7 @@ class TableRun {
 
   void run() try {
     record_.halfBlosc = maker_.baseline("", halfBlosc(), "").bytes;
-    for (const auto& path : options_.candidates) {
-      add(maker_.candidate(path));
-    }
+    for (const auto& path : options_.candidates) add(maker_.candidate(path));
     for (const auto& external : options_.externals) add(maker_.external(external));
     if (options_.fitDefault) add(maker_.fitted({}));
     if (options_.fitPaper) add(maker_.fitted({.paper = true}));
@@ -298,11 +287,7 @@ class TableRun {
   }
 
  private:
-  void add(TableRow row) {
-    if (scene_.cancel.cancelled()) throw Cancelled();
-    log_.detail("made " + row.group + ": " + row.name);
-    record_.rows.push_back(std::move(row));
-  }
+  void add(TableRow row) { addRow(scene_, log_, std::move(row), record_); }
 
   void addBaseline(const std::string& group, const BaselineSetting& setting) {
     add(maker_.baseline(group, setting, displayName(setting)));

@@ -3,7 +3,6 @@
 #include "compare/table_record.h"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <span>
@@ -137,7 +136,7 @@ Json searchJson(const TableRow& row) {
   Json steps = Json::array();
   for (const auto& step : row.search) {
     Json entry{{"setting", step.setting}, {"bytes", step.bytes}};
-    if (step.psnr) entry["psnr_box"] = std::isfinite(*step.psnr) ? Json(*step.psnr) : Json();
+    if (step.psnr) entry["psnr_box"] = finiteOrNull(*step.psnr);
     steps.push_back(std::move(entry));
   }
   return steps;
@@ -145,13 +144,7 @@ Json searchJson(const TableRow& row) {
 
 Json rowJson(const TableRow& row, const TableRecord& record) {
   Json json = Json::object();
-  for (const auto& column : tableColumns()) {
-    const Cell cell = column.of(row, record);
-    const auto& key = column.column.key;
-    if (const auto* text = std::get_if<std::string>(&cell)) json[key] = *text;
-    if (const auto* value = std::get_if<double>(&cell))
-      json[key] = std::isfinite(*value) ? Json(*value) : Json();
-  }
+  for (const auto& column : tableColumns()) addCell(column.column, column.of(row, record), json);
   if (row.memory) json["memory_bytes"] = *row.memory;
   if (row.bytes) json["bytes"] = *row.bytes;
   if (row.images && row.images->deviceBytes) json["device_bytes"] = *row.images->deviceBytes;
@@ -276,16 +269,12 @@ Html pictures(const TableRecord& record, const PageOrder& order) {
 /// with their best rivals.
 std::string tablePage(const TableOptions& options, const TableRecord& record) {
   const PageOrder order(record);
-  report::HtmlPage page;
-  page.title = options.reference.filename().string();
-  page.finding = findingOf(record);
+  report::HtmlPage page = pageOf(options, record);
   page.paragraphs = {sceneLine(record) + ".", order.duels().empty() ? "" : rivalRule(),
                      pictureLine(record), interruption(record)};
   page.sections = {overview(record, order), allRows(record, order)};
   if (!record.referencePng.empty())
     page.sections.push_back(report::section("pictures", "Pictures", pictures(record, order)));
-  page.commands = versionLines();
-  page.commands.insert(page.commands.begin(), joined(options.commandLine));
   return report::toHtml(page);
 }
 

@@ -40,6 +40,12 @@ std::vector<ListedGrid> listedGrids(const EsvrFile& file) {
   return grids;
 }
 
+std::span<const StoredGrid> storedParts(const EsvrFile& file, const GridOfFile& grid) {
+  const std::span all(file.grids);
+  return grid.isVector ? all.subspan(file.vectors[grid.index].first, kComponents)
+                       : all.subspan(grid.index, 1);
+}
+
 namespace {
 
 /// The named grids in file order; all grids if none is named.
@@ -187,9 +193,8 @@ void restrictToNamed(const Options& options, ReadPart& wanted) {
       wanted.carriedBytes = true;
       continue;
     }
-    const std::size_t first = grid.isVector ? file.vectors[grid.index].first : grid.index;
-    for (std::size_t c = 0; c < (grid.isVector ? kComponents : 1); ++c)
-      wanted.grids->push_back(first + c);
+    for (const StoredGrid& part : storedParts(file, grid))
+      wanted.grids->push_back(std::size_t(&part - file.grids.data()));
   }
 }
 
@@ -300,9 +305,7 @@ std::vector<const StoredGrid*> storedGrids(const EsvrFile& file,
   std::vector<const StoredGrid*> grids;
   for (const auto& [grid, name, place] : chosen) {
     if (grid.isCarried) continue;
-    const std::size_t first = grid.isVector ? file.vectors[grid.index].first : grid.index;
-    for (std::size_t g = first; g < first + (grid.isVector ? kComponents : 1); ++g)
-      grids.push_back(&file.grids[g]);
+    for (const StoredGrid& part : storedParts(file, grid)) grids.push_back(&part);
   }
   return grids;
 }

@@ -175,10 +175,8 @@ void listSplats(const Options& options) {
 /// The metadata of a grid. That of vectors is with their first component, and that of a carried grid is in
 /// its bytes, which may not have been read.
 std::vector<MetaItem> metadataOf(const EsvrFile& file, const ListedGrid& listed) {
-  const std::size_t index = listed.grid.index;
-  if (!listed.grid.isCarried)
-    return file.grids[listed.grid.isVector ? file.vectors[index].first : index].descriptor.metadata;
-  const CarriedGrid& carried = file.carried[index];
+  if (!listed.grid.isCarried) return storedParts(file, listed.grid).front().descriptor.metadata;
+  const CarriedGrid& carried = file.carried[listed.grid.index];
   return carried.bytes.empty() ? std::vector<MetaItem>() : inspectCarried(carried).metadata;
 }
 
@@ -215,34 +213,62 @@ FrameFile inspectFrame(const fs::path& path, const Options& options) {
   return frame;
 }
 
+/// The files of the frames of a pattern, which are inspected one after the other.
+class FrameFiles {
+ public:
+  FrameFiles(const Options& options, const cli::FramePattern& pattern)
+      : pattern_(pattern),
+        listing_(cli::framesOnDisk(pattern)),
+        log_(kProgram, options.verbosity) {}
+
+  /// Calls a function with the number and the file of each frame. If it fails, the others follow.
+  template <class Inspect>
+  void forEach(const Inspect& inspect) {
+    for (const cli::FrameNumber frame : listing_.frames) try {
+        inspect(frame, pattern_.toRead(frame));
+      } catch (const Error& error) {
+        log_.error("frame " + std::to_string(frame) + ": " + error.what());
+        if (!first_) first_ = error;
+        failed_.push_back(frame);
+      }
+  }
+
+  [[nodiscard]] std::size_t size() const { return listing_.frames.size(); }
+
+  /// Tells what looks like frames and is none.
+  void tellHint() const {
+    if (const std::string hint = listing_.hint(); !hint.empty())
+      log_.warning(pattern_.text() + ": " + hint);
+  }
+
+  /// \throws Error  the kind of the first frame that failed
+  void throwFailures() const {
+    if (first_) throw Error(first_->kind(), cli::sentenceOn(failed_, size(), "failed"));
+  }
+
+ private:
+  const cli::FramePattern& pattern_;
+  const cli::FrameListing listing_;
+  const cli::Log log_;
+  std::vector<cli::FrameNumber> failed_;
+  std::optional<Error> first_;
+};
+
 /// Prints a row for the file of each frame of a pattern.
 void listFrames(const Options& options, const cli::FramePattern& pattern) {
-  const cli::Log log(kProgram, options.verbosity);
-  const cli::FrameListing listing = cli::framesOnDisk(pattern);
+  FrameFiles files(options, pattern);
   cli::Table table({"frame", "bytes", "grids"});
-  std::vector<cli::FrameNumber> failed;
-  std::optional<Error> first;
   std::string notes;  // those of the first frame that has any
-  for (const cli::FrameNumber frame : listing.frames) {
-    const fs::path path = pattern.toRead(frame);
-    try {
-      FrameFile file = inspectFrame(path, options);
-      table.add(
-          {std::to_string(frame), std::to_string(fs::file_size(path)), std::move(file.grids)});
-      if (notes.empty()) notes = std::move(file.notes);
-    } catch (const Error& error) {
-      log.error("frame " + std::to_string(frame) + ": " + error.what());
-      if (!first) first = error;
-      failed.push_back(frame);
-    }
-  }
-  std::cout << cli::printable(pattern.text()) << ": " << listing.frames.size()
-            << " frames, a file each\n"
+  files.forEach([&](cli::FrameNumber frame, const fs::path& path) {
+    FrameFile file = inspectFrame(path, options);
+    table.add({std::to_string(frame), std::to_string(fs::file_size(path)), std::move(file.grids)});
+    if (notes.empty()) notes = std::move(file.notes);
+  });
+  std::cout << cli::printable(pattern.text()) << ": " << files.size() << " frames, a file each\n"
             << cli::printable(notes) << (notes.empty() ? "\n" : "\n\n");
   table.print(std::cout);
-  if (const std::string hint = listing.hint(); !hint.empty())
-    log.warning(pattern.text() + ": " + hint);
-  if (first) throw Error(first->kind(), cli::sentenceOn(failed, listing.frames.size(), "failed"));
+  files.tellHint();
+  files.throwFailures();
 }
 
 /// Prints the frames of a file that holds a sequence.
@@ -373,11 +399,9 @@ std::vector<std::string> rowOfCarried(const Listing& listing, const ListedGrid& 
 
 /// The number of voxels of a grid that are NaN or infinite, over the components of vectors.
 std::uint64_t nonFiniteIn(const Listing& listing, const GridOfFile& grid) {
-  if (grid.isCarried) return 0;
-  const std::size_t first = grid.isVector ? listing.file.vectors[grid.index].first : grid.index;
   std::uint64_t count = 0;
-  for (std::size_t g = first; g < first + (grid.isVector ? kComponents : 1); ++g)
-    count += listing.file.grids[g].nonFinite.total();
+  if (!grid.isCarried)
+    for (const StoredGrid& part : storedParts(listing.file, grid)) count += part.nonFinite.total();
   return count;
 }
 
@@ -585,24 +609,14 @@ void checkFile(const Options& options) {
 
 /// Checks the file of each frame.
 void checkFilesOf(const Options& options, const cli::FramePattern& pattern) {
-  const cli::Log log(kProgram, options.verbosity);
-  const cli::FrameListing listing = cli::framesOnDisk(pattern);
-  if (const std::string hint = listing.hint(); !hint.empty())
-    log.warning(pattern.text() + ": " + hint);
-  std::vector<cli::FrameNumber> failed;
-  std::optional<Error> first;
-  for (const cli::FrameNumber frame : listing.frames) {
+  FrameFiles files(options, pattern);
+  files.tellHint();
+  files.forEach([&](cli::FrameNumber, const fs::path& path) {
     Options own = options;
-    own.input = pattern.toRead(frame);
-    try {
-      checkFile(own);
-    } catch (const Error& error) {
-      log.error("frame " + std::to_string(frame) + ": " + error.what());
-      if (!first) first = error;
-      failed.push_back(frame);
-    }
-  }
-  if (first) throw Error(first->kind(), cli::sentenceOn(failed, listing.frames.size(), "failed"));
+    own.input = path;
+    checkFile(own);
+  });
+  files.throwFailures();
 }
 
 }  // namespace

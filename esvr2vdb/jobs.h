@@ -135,4 +135,7 @@ struct ListedGrid {
 /// All grids in file order.
 [[nodiscard]] std::vector<ListedGrid> listedGrids(const EsvrFile& file);
 
+/// A grid that is not carried, or the components of vectors.
+[[nodiscard]] std::span<const StoredGrid> storedParts(const EsvrFile& file, const GridOfFile& grid);
+
 }  // namespace esvr::esvr2vdb

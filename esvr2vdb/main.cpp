@@ -40,22 +40,19 @@ cli::ProgramText programText() {
           "\n"
           "If OUT ends in .nvdb, a NanoVDB file is written. It cannot hold the metadata of the "
           "file and of its grids, and of carried grids it gets those of floats, doubles and "
-          "vectors. "
-          "--lod, --max-ellipsoids and --bbox do not write carried grids, because they cannot be "
-          "cut. A warning names each grid that is left out, and naming such a grid with -g is an "
-          "error.\n"
+          "vectors. --lod, --max-ellipsoids and --bbox do not write carried grids, because they "
+          "cannot be cut. A warning names each grid that is left out, and naming such a grid with "
+          "-g is an error.\n"
           "\n"
           "A voxel is active where it differs from the background by more than a threshold, which "
           "was chosen when the file was made, or where the file has a mask that says so. The "
-          "bounding "
-          "box of the active voxels is that of the source. In a level set, the voxels of the "
-          "narrow "
-          "band are active.\n"
+          "bounding box of the active voxels is that of the source. In a level set, the voxels of "
+          "the narrow band are active.\n"
           "\n"
           "--list also prints the creator of a file or a grid, the frame rate (an item of metadata "
           "such as fps or frame_rate) and every item whose name has the word unit or units. It "
-          "counts bytes that several grids share for the first of them only. The table of "
-          "sections names the grid with which a section is shared.\n"
+          "counts bytes that several grids share for the first of them only. The table of sections "
+          "names the grid with which a section is shared.\n"
           "\n"
           "Splats have the optical depth of the grid (docs/splats.md): the extinction over a unit "
           "of the world is --density-scale times the value, by default such that the median column "
@@ -65,9 +62,8 @@ cli::ProgramText programText() {
           "\n"
           "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the "
           "frame in the name of the file. --list prints its frames and groups, and --check names "
-          "each frame that is lost. "
-          "With a pattern, --list prints a row for the file of each frame, and --check checks each "
-          "of them.\n"
+          "each frame that is lost. With a pattern, --list prints a row for the file of each "
+          "frame, and --check checks each of them.\n"
           "\n"
           "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be "
           "used, 5 not enough memory (--max-memory). A sequence has the code of its first frame "
@@ -129,10 +125,9 @@ cli::CommandLine commandLine() {
   // clang-format on
   cli::addSplatInput(line.options(),
                      "side of a voxel in units of the world: of a grid made of splats (default: "
-                     "1/256 of the longest "
-                     "side of the splats' box), or of grids of IN.esvr, which are averaged or, if "
-                     "they are ellipsoids, "
-                     "evaluated between the voxels (default: as in the source)");
+                     "1/256 of the longest side of the splats' box), or of grids of IN.esvr, which "
+                     "are averaged or, if they are ellipsoids, evaluated between the voxels "
+                     "(default: as in the source)");
   cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
   line.mainOptions({"list", "check", "grid", "lod", "bbox", "coarsen", "reference", "colors",
@@ -155,12 +150,6 @@ Job jobOf(const Arguments& a) {
 std::filesystem::path outputOf(const Arguments& a) {
   if (!a.has("output")) throw UsageError("missing argument OUT.vdb");
   return a.get<std::string>("output");
-}
-
-HalfMode halfOf(const Arguments& a) {
-  return cli::choose<HalfMode>(
-      "half", a.get<std::string>("half"),
-      {{"auto", HalfMode::kAuto}, {"on", HalfMode::kOn}, {"off", HalfMode::kOff}});
 }
 
 std::optional<std::size_t> countOf(const Arguments& a, const char* option) {
@@ -189,50 +178,43 @@ ColorMap colorsOf(const Arguments& a) {
   return builtInColorMap(text);
 }
 
-/// Refuses options that say nothing for the files that are read and written.
-void refuseOptions(const Arguments& a, const std::string& files,
-                   std::initializer_list<const char*> options) {
-  for (const char* option : options)
-    if (a.has(option) && !a.values[option].defaulted())
-      throw UsageError("--" + std::string(option) + " says nothing for " + files);
-}
-
 void readSplats(const Arguments& a, Options& options) {
   const bool isRead = cli::isSplatFile(options.input), isWritten = writesSplats(options);
   if (!isRead && !isWritten)
-    refuseOptions(a, "files without splats", {"colors", "kind", "density-scale", "up"});
+    cli::refuseOptions(a, "files without splats", {"colors", "kind", "density-scale", "up"});
   if (isRead && isWritten) throw UsageError("splats are not converted to splats");
   if (isRead)
-    refuseOptions(a, "splats in the input",
-                  {"grid", "threshold", "lod", "max-ellipsoids", "bbox", "coarsen", "reference",
-                   "box", "colors", "kind"});
+    cli::refuseOptions(a, "splats in the input",
+                       {"grid", "threshold", "lod", "max-ellipsoids", "bbox", "coarsen",
+                        "reference", "box", "colors", "kind"});
   if (isWritten)
-    refuseOptions(a, "splats in the output",
-                  {"threshold", "reference", "box", "half", "coarsen", "voxel-size"});
-  if (options.output.extension() == ".usda") refuseOptions(a, "USD", {"kind"});
+    cli::refuseOptions(a, "splats in the output",
+                       {"threshold", "reference", "box", "half", "coarsen", "voxel-size"});
+  if (options.output.extension() == ".usda") cli::refuseOptions(a, "USD", {"kind"});
   if (options.sequence && (isRead || isWritten))
     throw UsageError("splats are those of a single frame; name a file of one frame");
   options.splats.read = cli::splatInputOf(a);
   if (!isRead)
     options.resolution =
         resolutionOf(a.find<std::string>("coarsen"), options.splats.read.voxelSize);
-  options.splats.made = {.form = cli::choose<SplatForm>(
-                             "kind", a.get<std::string>("kind"),
-                             {{"viewer", SplatForm::kPly}, {"mitsuba", SplatForm::kMitsuba}}),
-                         .up = options.splats.read.up,
-                         .colors = isWritten ? colorsOf(a) : ColorMap{},
-                         .densityScale = options.splats.read.densityScale};
+  options.splats.made = {
+      .form = cli::choiceOf<SplatForm>(
+          a, "kind", {{"viewer", SplatForm::kPly}, {"mitsuba", SplatForm::kMitsuba}}),
+      .up = options.splats.read.up,
+      .colors = isWritten ? colorsOf(a) : ColorMap{},
+      .densityScale = options.splats.read.densityScale};
 }
 
 void readConversion(const Arguments& a, Options& options) {
   options.output = outputOf(a);
-  options.grids = a.find<std::vector<std::string>>("grid").value_or(std::vector<std::string>{});
+  options.grids = a.all("grid");
   options.decode.threshold = a.find<float>("threshold");
   if (options.decode.threshold)
     cli::requireRange("threshold", *options.decode.threshold, 0.0f,
                       std::numeric_limits<float>::max());
   readPart(a, options);
-  options.write.half = halfOf(a);
+  options.write.half = cli::choiceOf<HalfMode>(
+      a, "half", {{"auto", HalfMode::kAuto}, {"on", HalfMode::kOn}, {"off", HalfMode::kOff}});
   options.write.constantTiles = !a.get<bool>("no-tiles");
   options.write.overwrite = a.get<bool>("force");
   options.reference = a.find<std::string>("reference");

@@ -53,8 +53,7 @@ void tellWhatIsMissing(const MadeSplats& made, const cli::Log& log) {
   if (made.faintShare > kMuch)
     log.warning(
         "a part of the optical depth is left out, because it is too faint for the 8 bits of "
-        "formats; "
-        "a larger --density-scale or fewer ellipsoids keep more of it",
+        "formats; a larger --density-scale or fewer ellipsoids keep more of it",
         cli::shortNumber(100.0 * made.faintShare) + " %");
   if (made.clamped > 0)
     log.warning("splats have the smallest or the largest size that formats keep",

@@ -225,6 +225,13 @@ std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) c
   throw UsageError(error.what());
 }
 
+void refuseOptions(const Arguments& arguments, const std::string& files,
+                   std::initializer_list<const char*> options) {
+  for (const char* option : options)
+    if (arguments.isGiven(option))
+      throw UsageError("--" + std::string(option) + " says nothing for " + files);
+}
+
 void addDevice(po::options_description& options, const std::string& purpose,
                const std::string& more) {
   const std::string help = purpose + "auto (a GPU if one is usable), cpu, cuda or cuda:N" + more;

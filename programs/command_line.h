@@ -11,6 +11,7 @@
 #include <boost/program_options/positional_options.hpp>
 #include <boost/program_options/value_semantic.hpp>
 #include <boost/program_options/variables_map.hpp>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -21,6 +22,7 @@
 #include "programs/files.h"
 #include "programs/help_text.h"
 #include "programs/messages.h"
+#include "programs/option_values.h"
 
 namespace esvr::cli {
 
@@ -42,6 +44,15 @@ struct Arguments {
   template <class T>
   [[nodiscard]] std::optional<T> find(const std::string& option) const {
     return has(option) ? std::optional<T>(get<T>(option)) : std::nullopt;
+  }
+  /// The values of an option that may be repeated.
+  template <class T = std::string>
+  [[nodiscard]] std::vector<T> all(const std::string& option) const {
+    return find<std::vector<T>>(option).value_or(std::vector<T>{});
+  }
+  /// False if the option only has its default.
+  [[nodiscard]] bool isGiven(const std::string& option) const {
+    return has(option) && !values[option].defaulted();
   }
 };
 
@@ -119,6 +130,18 @@ void requireRange(const std::string& option, T value, T low, T high) {
   throw UsageError("--" + option + " must be from " + text(low) + " to " + text(high) + ", not " +
                    text(value));
 }
+
+/// The choice of an option that is given or has a default.
+/// \throws UsageError  the word is unknown; the message lists the known ones
+template <class T>
+[[nodiscard]] T choiceOf(const Arguments& arguments, const std::string& option,
+                         std::initializer_list<Choice<T>> choices) {
+  return choose<T>(option, arguments.get<std::string>(option), choices);
+}
+
+/// \throws UsageError  one of the options is given, which say nothing for these files
+void refuseOptions(const Arguments& arguments, const std::string& files,
+                   std::initializer_list<const char*> options);
 
 /// Adds the option --device. Its help text begins with `purpose` and ends with `more`.
 void addDevice(po::options_description& options, const std::string& purpose = {},

@@ -5,7 +5,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
 
@@ -16,8 +15,7 @@ namespace esvr::report {
 
 std::string plainText(double value) {
   std::array<char, 400> text;  // fixed notation of any double
-  std::snprintf(text.data(), text.size(), "%.3g", value);
-  const double rounded = std::strtod(text.data(), nullptr);
+  const double rounded = std::strtod(cli::formatted("%.3g", value).c_str(), nullptr);
   const auto end =
       std::to_chars(text.data(), text.data() + text.size(), rounded, std::chars_format::fixed);
   return {text.data(), end.ptr};
@@ -33,11 +31,7 @@ std::string bytesText(double bytes) {
 
 namespace {
 
-std::string formatted(const char* format, double value) {
-  std::array<char, 64> text;
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
+using cli::formatted;
 
 std::string numberText(Kind kind, double value) {
   switch (kind) {
@@ -89,8 +83,7 @@ std::string exactText(const Cell& cell) {
   const auto* value = std::get_if<double>(&cell);
   if (!value) return {};
   if (std::isinf(*value)) return *value > 0 ? "inf" : "-inf";
-  std::array<char, 32> text;
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), *value).ptr};
+  return cli::exactNumber(*value);
 }
 
 DataTable withColumns(const DataTable& table, const std::vector<std::string>& keys) {

@@ -2,6 +2,7 @@
 #include "programs/messages.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -46,12 +47,6 @@ void Log::warning(const std::string& message, const std::string& figure) const {
 namespace {
 
 using Rows = std::vector<std::vector<std::string>>;
-
-std::string formatted(const char* format, double value) {
-  char text[64];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
 
 std::string padded(const std::string& text, std::size_t width, bool flushLeft) {
   const std::string space(width - std::min(width, text.size()), ' ');
@@ -145,6 +140,17 @@ void Table::print(std::ostream& out, std::size_t width) const {
     printPart(rows, widths, first, end, out);
     first = end;
   }
+}
+
+std::string formatted(const char* format, double value) {
+  char text[400];  // fixed notation of any double
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string exactNumber(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 std::string decibels(double value) {

@@ -69,6 +69,10 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
+/// A number in a format of printf, in at most 400 characters.
+[[nodiscard]] std::string formatted(const char* format, double value);
+/// The fewest digits that give the number again.
+[[nodiscard]] std::string exactNumber(double value);
 /// A PSNR with two decimals, for example "51.54"; "exact" if it is infinite.
 [[nodiscard]] std::string decibels(double value);
 /// A number with four significant digits.

@@ -4,33 +4,22 @@
 #include <map>
 
 #include "programs/messages.h"
+#include "programs/option_values.h"
 
 namespace esvr::cli {
 
 std::string nameOf(ValueType type) {
-  switch (type) {
-    case ValueType::kHalf:
-      return "half";
-    case ValueType::kDouble:
-      return "double";
-    case ValueType::kFloat:
-      break;
-  }
-  return "float";
+  return wordOf(
+      type,
+      {{"half", ValueType::kHalf}, {"double", ValueType::kDouble}, {"float", ValueType::kFloat}});
 }
 
 std::string nameOf(KernelForm form) { return form == KernelForm::kPaper ? "paper" : "continuous"; }
 
 std::string nameOf(TopologyKind kind) {
-  switch (kind) {
-    case TopologyKind::kBricks:
-      return "bricks";
-    case TopologyKind::kMask:
-      return "mask";
-    case TopologyKind::kThreshold:
-      break;
-  }
-  return "threshold";
+  return wordOf(kind, {{"bricks", TopologyKind::kBricks},
+                       {"mask", TopologyKind::kMask},
+                       {"threshold", TopologyKind::kThreshold}});
 }
 
 std::string activityOf(const StoredGrid& grid) {
@@ -106,18 +95,21 @@ void addRanges(std::span<const GridTraits> other,
   }
 }
 
-std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {
+std::uint64_t bytesIf(const EsvrSummary& file,
+                      const std::function<bool(const SectionSummary&)>& counts) {
   std::uint64_t bytes = 0;
-  for (const auto& section : file.sections)
-    if (section.grid == grid) bytes += section.storedBytes;
+  for (const SectionSummary& section : file.sections)
+    if (counts(section)) bytes += section.storedBytes;
   return bytes;
 }
 
+std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid) {
+  return bytesIf(file, [&](const auto& section) { return section.grid == grid; });
+}
+
 std::uint64_t ownBytes(const EsvrSummary& file, std::size_t grid) {
-  std::uint64_t bytes = 0;
-  for (const auto& section : file.sections)
-    if (section.grid == grid && !section.sharedWith) bytes += section.storedBytes;
-  return bytes;
+  return bytesIf(file,
+                 [&](const auto& section) { return section.grid == grid && !section.sharedWith; });
 }
 
 }  // namespace esvr::cli

@@ -45,6 +45,9 @@ void addRanges(std::span<const GridTraits> other,
                const std::function<std::optional<std::array<float, 2>>(std::size_t)>& rangeOf,
                std::vector<GridTraits>& traits);
 
+/// Bytes of the sections that count.
+[[nodiscard]] std::uint64_t bytesIf(const EsvrSummary& file,
+                                    const std::function<bool(const SectionSummary&)>& counts);
 /// Bytes of the sections of a grid, whether it shares them with other grids or not.
 [[nodiscard]] std::uint64_t storedBytes(const EsvrSummary& file, std::size_t grid);
 /// Bytes of the sections of a grid without those that an earlier section has too. The sum over the

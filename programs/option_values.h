@@ -20,7 +20,7 @@ using esvr::parseNumber;
 using esvr::parseWhole;
 using esvr::splitText;
 
-/// A word that an option takes, and what it stands for.
+/// A word that an option takes or a report has, and what it stands for.
 template <class T>
 struct Choice {
   const char* word;
@@ -41,6 +41,14 @@ T choose(const std::string& option, const std::string& given,
     words.emplace_back(choice.word);
   }
   refuseWord(option, given, words);
+}
+
+/// The word of a value; empty if it has none.
+template <class T>
+[[nodiscard]] const char* wordOf(T value, std::initializer_list<Choice<T>> choices) {
+  for (const auto& choice : choices)
+    if (choice.value == value) return choice.word;
+  return "";
 }
 
 /// Parses a text like "1,-2.5,3e2" with `count` finite numbers.

@@ -43,11 +43,11 @@ using Attributes = std::vector<Attribute>;
 
 /// What a page says.
 struct HtmlPage {
-  std::string title;                    ///< what the page is about
-  std::string finding;                  ///< its headline; if it is empty, the title is
-  std::vector<std::string> paragraphs;  ///< empty ones are left out
-  std::vector<Html> sections;
-  std::vector<std::string> commands;  ///< and versions: a line each
+  std::string title{};                    ///< what the page is about
+  std::string finding{};                  ///< its headline; if it is empty, the title is
+  std::vector<std::string> paragraphs{};  ///< empty ones are left out
+  std::vector<Html> sections{};
+  std::vector<std::string> commands{};  ///< and versions: a line each
 };
 
 /// The page as HTML 5 in UTF-8.

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "programs/messages.h"
+#include "programs/option_values.h"
 #include "programs/page.h"
 #include "programs/pictures.h"
 
@@ -173,17 +174,10 @@ using Json = nlohmann::ordered_json;
 
 /// The names of units in charts.js.
 const char* nameOf(Unit unit) {
-  switch (unit) {
-    case Unit::kBytes:
-      return "bytes";
-    case Unit::kSeconds:
-      return "seconds";
-    case Unit::kPercent:
-      return "percent";
-    case Unit::kNone:
-      break;
-  }
-  return "none";
+  return cli::wordOf(unit, {{"bytes", Unit::kBytes},
+                            {"seconds", Unit::kSeconds},
+                            {"percent", Unit::kPercent},
+                            {"none", Unit::kNone}});
 }
 
 bool holds(const ChartAxis& axis, double value) {
@@ -253,18 +247,12 @@ RampColor colorAt(double place) {
   return color;
 }
 
-std::string printed(const char* format, double value) {
-  std::array<char, 32> text;
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
-
 Html gradient() {
   Html stops;
   for (std::size_t i = 0; i < kRamp.size(); ++i) {
     const auto level = [&](std::size_t c) { return std::to_string(levelOf(kRamp[i][c])); };
     stops += element("stop",
-                     {{"offset", printed("%.2f", double(i) / double(kRamp.size() - 1))},
+                     {{"offset", cli::formatted("%.2f", double(i) / double(kRamp.size() - 1))},
                       {"stop-color", "rgb(" + level(0) + "," + level(1) + "," + level(2) + ")"}},
                      Html{});
   }
@@ -285,19 +273,19 @@ Html errorScale() {
   Html content = gradient();
   content += element("rect",
                      {{"class", "frame"},
-                      {"x", printed("%.0f", kEdge)},
+                      {"x", cli::formatted("%.0f", kEdge)},
                       {"y", "1"},
-                      {"width", printed("%.0f", kWidth)},
-                      {"height", printed("%.0f", kHeight)},
+                      {"width", cli::formatted("%.0f", kWidth)},
+                      {"height", cli::formatted("%.0f", kHeight)},
                       {"style", "fill: url(#error-colors)"}},
                      Html{});
   for (const double tick : kScaleTicks)
     content += element("text",
-                       {{"x", printed("%.1f", kEdge + kWidth * placeOf(tick / kMostError))},
-                        {"y", printed("%.0f", kText)},
+                       {{"x", cli::formatted("%.1f", kEdge + kWidth * placeOf(tick / kMostError))},
+                        {"y", cli::formatted("%.0f", kText)},
                         {"text-anchor", "middle"}},
-                       printed("%g", tick));
-  const std::string most = printed("%g", kMostError);
+                       cli::formatted("%g", tick));
+  const std::string most = cli::formatted("%g", kMostError);
   Html figure =
       element("svg",
               {{"viewBox", "0 0 480 40"},

@@ -14,6 +14,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
+#include "programs/messages.h"
 
 namespace esvr::report {
 namespace {
@@ -98,9 +99,7 @@ constexpr double kPlainFrom = 1e-3, kPlainTo = 1e6;  // numbers that need no exp
 std::string tickText(double value) {
   const double size = std::abs(value);
   const bool plain = size == 0.0 || (size >= kPlainFrom && size < kPlainTo);
-  std::array<char, 32> text;
-  std::snprintf(text.data(), text.size(), plain ? "%.6g" : "%.0e", value);
-  return text.data();
+  return cli::formatted(plain ? "%.6g" : "%.0e", value);
 }
 
 int powerOf(double value) { return int(std::floor(std::log10(value) + kRounding)); }

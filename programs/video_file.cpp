@@ -12,7 +12,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
@@ -20,6 +19,7 @@
 #include <thread>
 
 #include "esvr/error.h"
+#include "programs/messages.h"
 #include "programs/pictures.h"
 
 extern char** environ;
@@ -214,12 +214,6 @@ Words codecOf(const fs::path& path) {
   return {"-c:v", "libx264", "-crf", "18", "-movflags", "+faststart", "-f", "mp4"};
 }
 
-std::string textOf(double number) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
-  return {text.data(), end};
-}
-
 Words inputOf(const VideoForm& form) {
   return {"-f",
           "rawvideo",
@@ -228,7 +222,7 @@ Words inputOf(const VideoForm& form) {
           "-video_size",
           std::to_string(form.width) + "x" + std::to_string(form.height),
           "-framerate",
-          textOf(form.fps),
+          cli::exactNumber(form.fps),
           "-i",
           "pipe:0"};
 }

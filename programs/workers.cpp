@@ -58,24 +58,10 @@ class Workers {
   std::exception_ptr error_;
 };
 
-std::vector<std::size_t> framesWithInput(const std::vector<Frame>& frames) {
-  std::vector<std::size_t> indices;
-  for (std::size_t i = 0; i < frames.size(); ++i)
-    if (!frames[i].missing) indices.push_back(i);
-  return indices;
-}
-
 }  // namespace
 
 void forEachTask(const TaskRun& run, const std::function<bool(const Task&)>& job) {
   Workers(run, job).run();
-}
-
-void forEachFrame(const FrameRun& run, const std::function<bool(const FrameTask&)>& job) {
-  const auto frames = framesWithInput(run.frames);
-  forEachTask({frames.size(), run.workers, run.onError, run.cancel}, [&](const Task& task) {
-    return job({frames[task.index], task.worker});
-  });
 }
 
 int taskWorkers(int threads, std::size_t tasks) {
@@ -83,12 +69,11 @@ int taskWorkers(int threads, std::size_t tasks) {
   return int(std::clamp<std::size_t>(tasks, 1, std::size_t(all)));
 }
 
-std::size_t countWithInput(const std::vector<Frame>& frames) {
-  return framesWithInput(frames).size();
-}
-
-int frameWorkers(int threads, const std::vector<Frame>& frames) {
-  return taskWorkers(threads, countWithInput(frames));
+std::vector<std::size_t> framesWithInput(const std::vector<Frame>& frames) {
+  std::vector<std::size_t> indices;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (!frames[i].missing) indices.push_back(i);
+  return indices;
 }
 
 bool Turnstile::await(std::size_t task) {

@@ -47,30 +47,11 @@ struct Task {
 ///             after all workers have ended
 void forEachTask(const TaskRun& run, const std::function<bool(const Task&)>& job);
 
-struct FrameRun {
-  const std::vector<Frame>& frames;
-  int workers = 1;
-  OnFrameError onError = OnFrameError::kContinue;
-  const CancelToken& cancel;
-};
+/// The indices of the frames that have an input, each of which is a task.
+[[nodiscard]] std::vector<std::size_t> framesWithInput(const std::vector<Frame>& frames);
 
-/// What a job gets: the index of a frame, and the number of the worker that converts it, from 0.
-struct FrameTask {
-  std::size_t frame = 0;
-  int worker = 0;
-};
-
-/// Calls a job for each frame that has an input, as forEachTask does.
-void forEachFrame(const FrameRun& run, const std::function<bool(const FrameTask&)>& job);
-
-/// The number of frames that have an input.
-[[nodiscard]] std::size_t countWithInput(const std::vector<Frame>& frames);
-
-/// The number of frames that are converted at the same time on the CPU: one for each thread.
+/// The number of tasks that run at the same time on the CPU: one for each thread.
 /// \param threads  value of --threads; 0: as many as the machine has
-[[nodiscard]] int frameWorkers(int threads, const std::vector<Frame>& frames);
-
-/// The same for any tasks.
 [[nodiscard]] int taskWorkers(int threads, std::size_t tasks);
 
 /// Lets tasks on several threads pass one after the other, in the order of their numbers: a task that

@@ -122,8 +122,7 @@ constexpr double kLargestRatio = 1e9;
 void refuseWith(const Arguments& a, const std::string& given,
                 std::initializer_list<const char*> options) {
   for (const char* option : options)
-    if (a.has(option) && !a.values[option].defaulted())
-      throw UsageError("--" + given + " cannot be combined with --" + option);
+    if (a.isGiven(option)) throw UsageError("--" + given + " cannot be combined with --" + option);
 }
 
 /// An option's number, which must be within [low, high], converted to another type.
@@ -136,19 +135,12 @@ std::optional<To> bounded(const Arguments& arguments, const std::string& option,
   return To(*given);
 }
 
-/// The names that an option gives.
-std::vector<std::string> namesIn(const Arguments& a, const char* option) {
-  return a.find<std::vector<std::string>>(option).value_or(std::vector<std::string>{});
-}
-
 FitOptions fitOptions(const Arguments& a) {
   FitOptions fit;
   fit.count = bounded<std::size_t>(a, "count", std::int64_t{1}, kMaxEllipsoids);
   fit.seconds = bounded<double>(a, "seconds", 1e-3, kLongestRun);
   fit.iterations = bounded<std::uint32_t>(a, "iterations", std::int64_t{1}, kMaxIterations);
-  fit.preset = cli::choose<Preset>(
-      "preset", a.get<std::string>("preset"),
-      {{"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}});
+  fit.preset = cli::choiceOf(a, "preset", kPresets);
   if (const auto memory = a.find<std::string>("max-vram"))
     fit.maxDeviceBytes = std::size_t(cli::parseDeviceMemory("max-vram", *memory));
   fit.chunkVoxels = bounded<std::uint64_t>(a, "chunk-voxels", std::int64_t{1},
@@ -157,36 +149,6 @@ FitOptions fitOptions(const Arguments& a) {
   fit.seed =
       *bounded<std::uint64_t>(a, "seed", std::int64_t{0}, std::numeric_limits<std::int64_t>::max());
   return fit;
-}
-
-int effort(const Arguments& a) {
-  return *bounded<int>(a, "effort", std::int64_t{kLeastEffort}, std::int64_t{kMostEffort});
-}
-
-Storage storage(const Arguments& a) {
-  return cli::choose<Storage>("storage", a.get<std::string>("storage"),
-                              {{"compact", Storage::kCompact}, {"float32", Storage::kFloat32}});
-}
-
-Activity activity(const Arguments& a) {
-  return cli::choose<Activity>("topology", a.get<std::string>("topology"),
-                               {{"auto", Activity::kByValue}, {"exact", Activity::kExact}});
-}
-
-StorageOptions storageOptions(const Arguments& a) {
-  return {.form = storage(a), .activity = activity(a)};
-}
-
-Representation representation(const Arguments& a) {
-  return cli::choose<Representation>("representation", a.get<std::string>("representation"),
-                                     {{"auto", Representation::kAuto},
-                                      {"ellipsoids", Representation::kEllipsoids},
-                                      {"voxels", Representation::kVoxels}});
-}
-
-Measure measure(const Arguments& a) {
-  return cli::choose<Measure>("measure", a.get<std::string>("measure"),
-                              {{"auto", Measure::kAuto}, {"values", Measure::kValues}});
 }
 
 /// \return nothing: the conversion chooses
@@ -307,11 +269,6 @@ void readNonFinite(const Arguments& a, ReadOptions& read) {
   read.nonFiniteValue = float(*value);
 }
 
-ProgressForm progressForm(const Arguments& a) {
-  return cli::choose<ProgressForm>("progress", a.get<std::string>("progress"),
-                                   {{"text", ProgressForm::kText}, {"json", ProgressForm::kJson}});
-}
-
 void readMemory(const Arguments& a, Options& options) {
   constexpr std::uint64_t kVolumes = 3;    // the source, its codes and what they decode to
   constexpr std::uint64_t kFitsShare = 2;  // one of two; the rest is for the volume and its copy
@@ -332,12 +289,8 @@ void readResume(const Arguments& a, Options& options) {
 
 /// Reads the options of splats after those of a sequence and --resume.
 void readSplats(const Arguments& a, Options& options) {
-  if (!cli::isSplatFile(options.input)) {
-    for (const char* option : {"voxel-size", "density-scale", "up"})
-      if (a.has(option) && !a.values[option].defaulted())
-        throw UsageError("--" + std::string(option) + " says nothing for an input without splats");
-    return;
-  }
+  if (!cli::isSplatFile(options.input))
+    return cli::refuseOptions(a, "an input without splats", {"voxel-size", "density-scale", "up"});
   if (options.sequence)
     throw UsageError("splats are those of a single frame; name a file of one frame");
   if (options.resume)
@@ -365,22 +318,23 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.input = a.get<std::string>("input");
   options.output = a.get<std::string>("output");
   options.inputs = a.inputs;
-  options.grids = {namesIn(a, "grid"), namesIn(a, "keep"), namesIn(a, "skip"), false};
-  options.shares =
-      cli::choose<bool>("share", a.get<std::string>("share"), {{"auto", true}, {"off", false}});
+  options.grids = {a.all("grid"), a.all("keep"), a.all("skip"), false};
+  options.shares = cli::choiceOf(a, "share", kShares);
   readGridGoals(a, options);
   options.picturePsnr = bounded<double>(a, "picture-psnr", 0.0, kHighestPsnr);
-  options.convert.measure = measure(a);
+  options.convert.measure = cli::choiceOf(a, "measure", kMeasures);
   options.convert.tone = toneCurve(a);
   options.convert.fit = fitOptions(a);
   options.convert.fit.psnr = options.psnr;
-  options.convert.storage = storageOptions(a);
+  options.convert.storage = {.form = cli::choiceOf(a, "storage", kStorages),
+                             .activity = cli::choiceOf(a, "topology", kActivities)};
   readPaper(a, options);
   readSize(a, options);
   options.convert.goal = commonGoal(a, options);
   options.grids.lossless = a.get<bool>("lossless");
-  options.convert.representation = representation(a);
-  options.convert.effort = effort(a);
+  options.convert.representation = cli::choiceOf(a, "representation", kRepresentations);
+  options.convert.effort =
+      *bounded<int>(a, "effort", std::int64_t{kLeastEffort}, std::int64_t{kMostEffort});
   requireRepresentation(a, options);
   readNonFinite(a, options.read);
   readMemory(a, options);
@@ -389,7 +343,8 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   readFrames(a, options);
   readSplats(a, options);
   options.report = a.find<std::string>("report").value_or("");
-  options.progress = progressForm(a);
+  options.progress = cli::choiceOf<ProgressForm>(
+      a, "progress", {{"text", ProgressForm::kText}, {"json", ProgressForm::kJson}});
   options.overwrite = a.get<bool>("force");
   options.threads = a.threads;
   options.verbosity = a.verbosity;

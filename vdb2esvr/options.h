@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <string>
@@ -27,6 +28,21 @@ namespace esvr::vdb2esvr {
 inline constexpr const char* kProgram = "vdb2esvr";
 /// The largest number of ellipsoids that options may name.
 inline constexpr std::int64_t kMaxEllipsoids = std::numeric_limits<std::uint32_t>::max();
+
+// The words of options, by which the report names the same things.
+inline constexpr std::initializer_list<cli::Choice<Preset>> kPresets{
+    {"draft", Preset::kDraft}, {"standard", Preset::kStandard}, {"high", Preset::kHigh}};
+inline constexpr std::initializer_list<cli::Choice<Storage>> kStorages{
+    {"compact", Storage::kCompact}, {"float32", Storage::kFloat32}};
+inline constexpr std::initializer_list<cli::Choice<Activity>> kActivities{
+    {"auto", Activity::kByValue}, {"exact", Activity::kExact}};
+inline constexpr std::initializer_list<cli::Choice<Representation>> kRepresentations{
+    {"auto", Representation::kAuto},
+    {"ellipsoids", Representation::kEllipsoids},
+    {"voxels", Representation::kVoxels}};
+inline constexpr std::initializer_list<cli::Choice<Measure>> kMeasures{
+    {"auto", Measure::kAuto}, {"values", Measure::kValues}};
+inline constexpr std::initializer_list<cli::Choice<bool>> kShares{{"auto", true}, {"off", false}};
 
 /// The goal of a single grid.
 struct GridGoal {

@@ -75,9 +75,16 @@ void readPasses(const Setting& setting, PaperMethod& method) {
 
 /// \throws UsageError  the value is none of the choices
 template <class T>
-T wordOf(const Setting& setting, std::initializer_list<cli::Choice<T>> choices) {
+T choiceIn(const Setting& setting, std::initializer_list<cli::Choice<T>> choices) {
   return cli::choose<T>("paper " + setting.key, setting.value, choices);
 }
+
+constexpr std::initializer_list<cli::Choice<PruneScore>> kScores{
+    {"full", PruneScore::kFull},
+    {"no-fa", PruneScore::kWithoutFa},
+    {"only-fa", PruneScore::kOnlyFa},
+    {"contribution", PruneScore::kContribution},
+    {"rays", PruneScore::kRays}};
 
 std::string ratesText(const PaperRates& rates) {
   std::string text;
@@ -104,7 +111,7 @@ std::vector<Key> methodKeys(const PaperMethod& m) {
        [](const Setting& s, PaperMethod& p) { p = scaledTo(p, s.epochs()); }},
       {"kernel", "ellipsoid", "ellipsoid, or gaussian (Gaussians that end at 3 sigma)",
        [](const Setting& s, PaperMethod& p) {
-         p.gaussian = wordOf<bool>(s, {{"ellipsoid", false}, {"gaussian", true}});
+         p.gaussian = choiceIn<bool>(s, {{"ellipsoid", false}, {"gaussian", true}});
        }},
       {"k", text(m.k), "sharpness of the ellipsoids, or 'learned' for each one", readK},
       {"beta", text(m.beta), "share of L1 in the loss; the rest is D-SSIM",
@@ -131,7 +138,7 @@ std::vector<Key> densifyKeys(const PaperMethod& m) {
   return {
       {"densify", "on", "densification: on, or off (ellipsoids are neither cloned nor split)",
        [](const Setting& s, PaperMethod& p) {
-         p.densify = wordOf<bool>(s, {{"on", true}, {"off", false}});
+         p.densify = choiceIn<bool>(s, {{"on", true}, {"off", false}});
        }},
       {"densify-from", std::to_string(m.densifyFrom), "epoch of the first densification",
        [](const Setting& s, PaperMethod& p) { p.densifyFrom = s.epochs(); }},
@@ -154,13 +161,7 @@ std::vector<Key> pruneKeys(const PaperMethod& m) {
       {"prune-score", "full",
        "full (coverage * intensity * FA), no-fa, only-fa, contribution (sum of values), or\n"
        "rays (the score of LightGaussian: light and opacity over the rays of 360 views)",
-       [](const Setting& s, PaperMethod& p) {
-         p.score = wordOf<PruneScore>(s, {{"full", PruneScore::kFull},
-                                          {"no-fa", PruneScore::kWithoutFa},
-                                          {"only-fa", PruneScore::kOnlyFa},
-                                          {"contribution", PruneScore::kContribution},
-                                          {"rays", PruneScore::kRays}});
-       }},
+       [](const Setting& s, PaperMethod& p) { p.score = choiceIn(s, kScores); }},
       {"prune-share", text(m.prunes.front().share), "share of the ellipsoids that a pass removes",
        [](const Setting& s, PaperMethod& p) {
          for (PrunePass& pass : p.prunes) pass.share = s.number(0.0, 0.999999);
@@ -256,22 +257,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const char* nameOf(PruneScore score) {
-  switch (score) {
-    case PruneScore::kWithoutFa:
-      return "no-fa";
-    case PruneScore::kOnlyFa:
-      return "only-fa";
-    case PruneScore::kContribution:
-      return "contribution";
-    case PruneScore::kRays:
-      return "rays";
-    case PruneScore::kFull:
-      break;
-  }
-  return "full";
-}
-
 Json ratesOf(const PaperRates& rates) {
   return {{"position", rates.position},
           {"scale", rates.scale},
@@ -320,7 +305,7 @@ Json paperJson(const PaperRecord& record) {
           {"subvolumes", record.subvolumes},
           {"rates", ratesOf(m.rates)},
           {"densify", densifyOf(record)},
-          {"prune_score", nameOf(m.score)},
+          {"prune_score", cli::wordOf(m.score, kScores)},
           {"prunes", prunesOf(record)},
           {"hits", record.hits}};
 }

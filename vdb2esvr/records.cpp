@@ -7,6 +7,7 @@
 
 #include "esvr/error.h"
 #include "programs/names.h"
+#include "programs/option_values.h"
 #include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {
@@ -14,10 +15,8 @@ namespace esvr::vdb2esvr {
 // A run.
 
 std::uint64_t bytesOf(const EsvrSummary& file, std::size_t grid, const std::string& kind) {
-  std::uint64_t bytes = 0;
-  for (const SectionSummary& s : file.sections)
-    if (s.grid == grid && s.kind == kind) bytes += s.storedBytes;
-  return bytes;
+  return cli::bytesIf(file,
+                      [&](const SectionSummary& s) { return s.grid == grid && s.kind == kind; });
 }
 
 std::size_t numberOfCarried(const RunRecord& record, std::size_t carried) {
@@ -88,23 +87,13 @@ Error interruption(const SequenceRecord& record) {
 }  // namespace
 
 const char* nameOf(FrameState state) {
-  switch (state) {
-    case FrameState::kNotBegun:
-      return "not begun";
-    case FrameState::kConverted:
-      return "converted";
-    case FrameState::kHeld:
-      return "held";
-    case FrameState::kKept:
-      return "kept";
-    case FrameState::kMissing:
-      return "missing";
-    case FrameState::kInterrupted:
-      return "interrupted";
-    case FrameState::kFailed:
-      break;
-  }
-  return "failed";
+  return cli::wordOf(state, {{"not begun", FrameState::kNotBegun},
+                             {"converted", FrameState::kConverted},
+                             {"held", FrameState::kHeld},
+                             {"kept", FrameState::kKept},
+                             {"missing", FrameState::kMissing},
+                             {"interrupted", FrameState::kInterrupted},
+                             {"failed", FrameState::kFailed}});
 }
 
 void takeFigures(const RunRecord& run, FrameRecord& frame) {

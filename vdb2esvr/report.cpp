@@ -10,6 +10,7 @@
 #include "programs/help_text.h"
 #include "programs/memory.h"
 #include "programs/names.h"
+#include "programs/option_values.h"
 
 namespace esvr::vdb2esvr {
 namespace {
@@ -29,36 +30,11 @@ Json toJson(const Box& box) {
 
 // What was asked for.
 
-const char* nameOf(Preset preset) {
-  switch (preset) {
-    case Preset::kDraft:
-      return "draft";
-    case Preset::kHigh:
-      return "high";
-    case Preset::kStandard:
-      break;
-  }
-  return "standard";
-}
-
-const char* nameOf(Activity activity) { return activity == Activity::kExact ? "exact" : "auto"; }
-
-const char* nameOf(Representation representation) {
-  switch (representation) {
-    case Representation::kEllipsoids:
-      return "ellipsoids";
-    case Representation::kVoxels:
-      return "voxels";
-    case Representation::kAuto:
-      break;
-  }
-  return "auto";
-}
-
-/// The wanted bound on the error.
-Json maxErrorOf(const Goal& goal) {
-  const auto* within = std::get_if<BoundGoal>(&goal);
-  return within ? Json(within->bound) : Json(nullptr);
+/// A member of a goal of a kind; null if the goal is of another kind.
+template <class Kind, class Member>
+Json memberOf(const Goal& goal, Member Kind::*member) {
+  const auto* wanted = std::get_if<Kind>(&goal);
+  return wanted ? Json(wanted->*member) : Json(nullptr);
 }
 
 bool isShare(const Goal& goal) {
@@ -66,12 +42,7 @@ bool isShare(const Goal& goal) {
   return within && within->relative;
 }
 
-/// The wanted bound relative to each value, and the magnitude below which it does not fall.
-Json maxRelativeErrorOf(const Goal& goal) {
-  const auto* within = std::get_if<RelativeBoundGoal>(&goal);
-  return within ? Json(within->share) : Json(nullptr);
-}
-
+/// The magnitude below which a bound relative to each value does not fall.
 Json relativeFloorOf(const Goal& goal) {
   const auto* within = std::get_if<RelativeBoundGoal>(&goal);
   return within ? orNull(within->floor) : Json(nullptr);
@@ -80,13 +51,11 @@ Json relativeFloorOf(const Goal& goal) {
 /// The goals of single grids.
 Json goalsOf(const std::vector<GridGoal>& goals) {
   Json list = Json::array();
-  for (const GridGoal& own : goals) {
-    const auto* psnr = std::get_if<PsnrGoal>(&own.goal);
+  for (const GridGoal& own : goals)
     list.push_back({{"grid", own.grid},
-                    {"psnr", psnr ? Json(psnr->psnr) : Json(nullptr)},
-                    {"max_error", maxErrorOf(own.goal)},
+                    {"psnr", memberOf(own.goal, &PsnrGoal::psnr)},
+                    {"max_error", memberOf(own.goal, &BoundGoal::bound)},
                     {"max_error_is_share", isShare(own.goal)}});
-  }
   return list;
 }
 
@@ -110,26 +79,26 @@ Json askedJson(const Options& options) {
   return {{"count", orNull(fit.count)},
           {"psnr", orNull(options.psnr)},
           {"picture_psnr", orNull(options.picturePsnr)},
-          {"measure", options.convert.measure == Measure::kAuto ? "auto" : "values"},
+          {"measure", cli::wordOf(options.convert.measure, kMeasures)},
           {"tone", toneJson(options.convert.tone)},
           {"size", orNull(options.size)},
           {"ratio", orNull(options.ratio)},
           {"lossless", std::holds_alternative<LosslessGoal>(options.convert.goal)},
-          {"max_error", maxErrorOf(options.convert.goal)},
+          {"max_error", memberOf(options.convert.goal, &BoundGoal::bound)},
           {"max_error_is_share", isShare(options.convert.goal)},
-          {"max_relative_error", maxRelativeErrorOf(options.convert.goal)},
+          {"max_relative_error", memberOf(options.convert.goal, &RelativeBoundGoal::share)},
           {"relative_floor", relativeFloorOf(options.convert.goal)},
-          {"representation", nameOf(options.convert.representation)},
+          {"representation", cli::wordOf(options.convert.representation, kRepresentations)},
           {"goals", goalsOf(options.gridGoals)},
-          {"share", options.shares ? "auto" : "off"},
+          {"share", cli::wordOf(options.shares, kShares)},
           {"seconds", orNull(fit.seconds)},
           {"iterations", orNull(fit.iterations)},
           {"method", options.paper ? "paper" : "default"},
-          {"preset", nameOf(fit.preset)},
+          {"preset", cli::wordOf(fit.preset, kPresets)},
           {"effort", options.convert.effort},
           {"box", fit.box ? toJson(*fit.box) : Json(nullptr)},
-          {"storage", storage.form == Storage::kCompact ? "compact" : "float32"},
-          {"topology", nameOf(storage.activity)},
+          {"storage", cli::wordOf(storage.form, kStorages)},
+          {"topology", cli::wordOf(storage.activity, kActivities)},
           {"keep", options.grids.keep},
           {"skip", options.grids.skip},
           {"seed", fit.seed},
@@ -144,19 +113,11 @@ Json askedJson(const Options& options) {
 namespace {
 
 const char* nameOf(FitEnd end) {
-  switch (end) {
-    case FitEnd::kScheduleDone:
-      return "schedule done";
-    case FitEnd::kPsnrReached:
-      return "psnr reached";
-    case FitEnd::kTimeUp:
-      return "time up";
-    case FitEnd::kCancelled:
-      return "interrupted";
-    case FitEnd::kPsnrMissed:
-      return "psnr missed";
-  }
-  return "";
+  return cli::wordOf(end, {{"schedule done", FitEnd::kScheduleDone},
+                           {"psnr reached", FitEnd::kPsnrReached},
+                           {"time up", FitEnd::kTimeUp},
+                           {"interrupted", FitEnd::kCancelled},
+                           {"psnr missed", FitEnd::kPsnrMissed}});
 }
 
 /// The inactive values that the file does not hold; null if there is none.
@@ -450,19 +411,11 @@ Json totalSeconds(const RunRecord& record) {
 }
 
 const char* nameOf(ErrorKind kind) {
-  switch (kind) {
-    case ErrorKind::kUsage:
-      return "usage";
-    case ErrorKind::kBadInput:
-      return "bad input";
-    case ErrorKind::kTargetMissed:
-      return "target missed";
-    case ErrorKind::kDevice:
-      return "device";
-    case ErrorKind::kRuntime:
-      break;
-  }
-  return "failure";
+  return cli::wordOf(kind, {{"usage", ErrorKind::kUsage},
+                            {"bad input", ErrorKind::kBadInput},
+                            {"target missed", ErrorKind::kTargetMissed},
+                            {"device", ErrorKind::kDevice},
+                            {"failure", ErrorKind::kRuntime}});
 }
 
 /// The first items of every report: program, versions and options.
@@ -538,7 +491,7 @@ Json entryOf(const SequenceRecord& record, const FrameRecord& frame) {
       frame.frame.holds ? Json(record.frames[*frame.frame.holds].frame.number) : Json(nullptr);
   entry["input"] = {{"path", frame.frame.input.string()}};
   entry["output"] = outputOf(frame);
-  entry["group"] = frame.group ? Json(*frame.group) : Json(nullptr);
+  entry["group"] = orNull(frame.group);
   entry["error"] = nullptr;
   if (frame.report.is_object()) entry.update(frame.report);
   return entry;
@@ -566,7 +519,7 @@ Json rangesOf(const SequenceRecord& record) {
 Json outputOf(const Options& options, const SequenceRecord& record) {
   Json output{{"path", options.output.string()}};
   if (!record.file) return output;
-  output["bytes"] = record.file->bytes ? Json(*record.file->bytes) : Json(nullptr);
+  output["bytes"] = orNull(record.file->bytes);
   output["groups"] = record.file->groups;
   return output;
 }

@@ -478,8 +478,7 @@ void tellWhatSurvives(const Options& options, const cli::Log& log) {
   log.info(
       "if MPI ends this run early, the best result so far is written if that takes less than the "
       "second that Open MPI leaves (OMPI_MCA_odls_base_sigkill_timeout=10 leaves 10); --resume "
-      "keeps "
-      "the finished parts in any case");
+      "keeps the finished parts in any case");
 }
 
 /// The number of cores that a process may use (0: this one), or 0 if the system does not tell.

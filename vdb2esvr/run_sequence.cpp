@@ -296,20 +296,21 @@ class SequenceConversion {
         conversion_(options, frames, cancel) {}
 
   SequenceRecord run() {
-    const int workers = conversion_.workers(cli::countWithInput(frames_));
-    cli::forEachFrame({frames_, workers, options_.sequence->onError, cancel_},
-                      [&](const cli::FrameTask& task) { return convertWithHolders(task); });
+    const auto frames = cli::framesWithInput(frames_);
+    cli::forEachTask(
+        {frames.size(), conversion_.workers(frames.size()), options_.sequence->onError, cancel_},
+        [&](const cli::Task& task) { return convertWithHolders(frames[task.index], task.worker); });
     return conversion_.finish();
   }
 
  private:
   /// Converts a frame and repeats its output for the frames that hold it.
   /// \return false if one of them failed
-  bool convertWithHolders(const cli::FrameTask& task) {
-    FrameRecord& source = conversion_.frames()[task.frame];
-    conversion_.attempt(source, [&] { convert(source, task.worker); });
+  bool convertWithHolders(std::size_t frame, int worker) {
+    FrameRecord& source = conversion_.frames()[frame];
+    conversion_.attempt(source, [&] { convert(source, worker); });
     bool isWell = source.state != FrameState::kFailed;
-    const auto [begin, end] = holders_.equal_range(task.frame);
+    const auto [begin, end] = holders_.equal_range(frame);
     for (auto at = begin; at != end && source.state != FrameState::kInterrupted; ++at) {
       FrameRecord& holder = conversion_.frames()[at->second];
       conversion_.attempt(holder, [&] { hold(source, holder); });

@@ -14,9 +14,8 @@
 namespace esvr::test {
 
 /// Runs a command of the program: "check", "table" or "curves".
-inline ProgramRun compare(const std::string& command, std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), command);
-  return runProgram(ESVR_COMPARE, arguments);
+inline ProgramRun compare(const std::string& command, const Words& arguments) {
+  return runProgram(ESVR_COMPARE, joined({command}, arguments));
 }
 
 /// A folder with a grid, `ref.vdb`, and a fit of it, `fit.esvr`.
@@ -24,13 +23,13 @@ class FittedBall : public FolderTest {
  protected:
   void SetUp() override {
     writeInput(at("ref.vdb"), {{.voxels = softBall({})}});
-    ASSERT_EQ(quickFit(at("ref.vdb"), at("fit.esvr")).exitCode, 0);
+    succeeded(quickFit(at("ref.vdb"), at("fit.esvr")));
   }
 };
 
 /// The fields of each line. Quoted fields have neither quotes nor line feeds in these tests.
-inline std::vector<std::vector<std::string>> csvFields(const std::string& csv) {
-  std::vector<std::vector<std::string>> lines;
+inline std::vector<Words> csvFields(const std::string& csv) {
+  std::vector<Words> lines;
   std::istringstream stream(csv);
   for (std::string line; std::getline(stream, line);) {
     auto& fields = lines.emplace_back(1);

@@ -1,48 +1,28 @@
-// Plan: `esvr-compare table` is run as a separate process, on a small grid. The tests check which
-// rows there are, that figures agree with the files, that the command of a row makes the same row,
-// matched sizes, external results and commands, all report formats, and what the program refuses.
-// `esvr-compare curves` is run as a separate process. The tests check the points in both data
-// formats, the pictures that are written, the sizes that the program chooses, and what it refuses.
+// Plan: `esvr-compare table` and `esvr-compare curves` are run as separate processes on a small grid.
+// Figures agree with the files, and the command of a row makes the same row.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <filesystem>
 #include <fstream>
 #include <iomanip>
-#include <nlohmann/json.hpp>
 #include <set>
-#include <sstream>
 
 #include "cli/compare_fixture.h"
-#include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using nlohmann::json;
-using test::Refusal;
-using test::softBall;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-test::ProgramRun table(const std::vector<std::string>& arguments) {
-  return test::compare("table", arguments);
-}
+ProgramRun table(const Words& arguments) { return compare("table", arguments); }
 
-class CompareTable : public test::FittedBall {
+class CompareTable : public FittedBall {
  protected:
-  [[nodiscard]] json reportOf(std::vector<std::string> arguments) const {
+  [[nodiscard]] Json reportOf(Words arguments) const {
     arguments.insert(arguments.begin(), at("ref.vdb"));
-    arguments.insert(arguments.end(), {"--runs", "1", "--report", "-"});
-    const auto run = table(arguments);
-    EXPECT_EQ(run.exitCode, 0) << run.err;
-    return json::parse(run.out, nullptr, false);
+    const auto run = succeeded(table(joined(arguments, "--runs 1 --report -")));
+    return Json::parse(run.out, nullptr, false);
   }
   /// Writes the ball's box, from (-4, -4, -4) to (4, 4, 4), as raw float32, with `error` added to
   /// every voxel.
@@ -57,14 +37,14 @@ class CompareTable : public test::FittedBall {
   }
 };
 
-const json* rowOf(const json& report, const std::string& name, const std::string& group = {}) {
+const Json* rowOf(const Json& report, const std::string& name, const std::string& group = {}) {
   for (const auto& row : report["rows"])
     if (row["name"] == name && (group.empty() || row["group"] == group)) return &row;
   return nullptr;
 }
 
 /// The number of rows of a group that were made. None of them may have more than `bytes`.
-int rowsWithin(const json& report, const std::string& group, std::uint64_t bytes) {
+int rowsWithin(const Json& report, const std::string& group, std::uint64_t bytes) {
   int rows = 0;
   for (const auto& row : report["rows"])
     if (row["group"] == group && row.contains("bytes")) {
@@ -75,15 +55,15 @@ int rowsWithin(const json& report, const std::string& group, std::uint64_t bytes
 }
 
 TEST_F(CompareTable, refusesWhatTakesMoreMemoryThanAllowed) {
-  const auto run = table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--max-memory", "1KB"});
-  EXPECT_EQ(run.exitCode, 5) << run.err;
+  EXPECT_THAT(table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--max-memory", "1KB"}),
+              Fails(5));
 }
 
 TEST_F(CompareTable, hasLosslessRowsWithoutError) {
-  const auto report = reportOf({"--rows", "lossless"});
+  const auto report = reportOf("--rows lossless");
   for (const char* name : {"OpenVDB float Blosc", "OpenVDB float Zip", "NanoVDB float raw",
                            "NanoVDB float Zip", "NanoVDB float Blosc"}) {
-    const json* row = rowOf(report, name);
+    const Json* row = rowOf(report, name);
     ASSERT_NE(row, nullptr) << name;
     EXPECT_TRUE((*row)["psnr_box"].is_null()) << name << " infinite";
     EXPECT_TRUE((*row)["psnr_t50"].is_null()) << name << " infinite";
@@ -93,7 +73,7 @@ TEST_F(CompareTable, hasLosslessRowsWithoutError) {
     EXPECT_GT((*row)["encode_s"].get<double>(), 0.0);
     EXPECT_GT((*row)["decode_s"].get<double>(), 0.0);
   }
-  const json* half = rowOf(report, "OpenVDB half Blosc", "nearly lossless");
+  const Json* half = rowOf(report, "OpenVDB half Blosc", "nearly lossless");
   ASSERT_NE(half, nullptr) << "the values of the ball are not half floats";
   EXPECT_EQ((*half)["ratio"], 1.0) << "what ratios are to";
   for (const auto& row : report["rows"])
@@ -101,16 +81,16 @@ TEST_F(CompareTable, hasLosslessRowsWithoutError) {
 }
 
 TEST_F(CompareTable, callsHalfFloatsLosslessWhereTheyAre) {
-  test::writeInput(at("halves.vdb"), {{.voxels = {{{0, 0, 0}, 0.5f}, {{1, 0, 0}, 0.25f}}}});
-  const auto run = table({at("halves.vdb"), "--rows", "lossless", "--runs", "1", "--report", "-"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const json report = json::parse(run.out);
+  writeInput(at("halves.vdb"), {{.voxels = {{{0, 0, 0}, 0.5f}, {{1, 0, 0}, 0.25f}}}});
+  const auto run =
+      succeeded(table({at("halves.vdb"), "--rows", "lossless", "--runs", "1", "--report", "-"}));
+  const Json report = Json::parse(run.out);
   EXPECT_NE(rowOf(report, "OpenVDB half Zip", "lossless"), nullptr);
   for (const auto& row : report["rows"]) EXPECT_EQ(row["group"], "lossless") << row["name"];
 }
 
 TEST_F(CompareTable, hasQuantisedRowsWithinTheirBounds) {
-  const auto report = reportOf({"--rows", "quantised"});
+  const auto report = reportOf("--rows quantised");
   EXPECT_LE((*rowOf(report, "NanoVDB Fp8 Zip"))["max_error"].get<double>(), 0.51 / 255);
   EXPECT_LE((*rowOf(report, "NanoVDB Fp4 raw"))["max_error"].get<double>(), 0.51 / 15);
   EXPECT_THAT((*rowOf(report, "NanoVDB FpN/256 raw"))["setting"], HasSubstr("tolerance="));
@@ -119,23 +99,21 @@ TEST_F(CompareTable, hasQuantisedRowsWithinTheirBounds) {
 TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
   // The smallest VDB file has about 1500 bytes. A candidate must be larger, so that other rows can
   // match its size.
-  ASSERT_EQ(test::vdb2esvr({at("ref.vdb"), at("large.esvr"), "--count", "60", "--iterations", "60",
-                            "--storage", "float32"})
-                .exitCode,
-            0);
-  const auto run = table({at("ref.vdb"), at("large.esvr"), "--rows", "matched,zfp", "--size", "2KB",
-                          "--runs", "1", "-v", "--report", at("report.json")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("trials"), HasSubstr(" bytes,")));
-  const auto report = json::parse(test::readText(at("report.json")), nullptr, false);
-  const json* candidate = rowOf(report, "large.esvr");
+  succeeded(vdb2esvr({at("ref.vdb"), at("large.esvr"), "--count", "60", "--iterations", "60",
+                      "--storage", "float32"}));
+  EXPECT_THAT(succeeded(table({at("ref.vdb"), at("large.esvr"), "--rows", "matched,zfp", "--size",
+                               "2KB", "--runs", "1", "-v", "--report", at("report.json")}))
+                  .out,
+              Says("trials", " bytes,"));
+  const auto report = Json::parse(readText(at("report.json")), nullptr, false);
+  const Json* candidate = rowOf(report, "large.esvr");
   ASSERT_NE(candidate, nullptr);
   const auto bytes = (*candidate)["bytes"].get<std::uint64_t>();
   EXPECT_EQ(bytes, std::filesystem::file_size(at("large.esvr")));
   EXPECT_GT(bytes, 1800u);
   for (const std::uint64_t size : {bytes, std::uint64_t{2000}}) {
     const std::string group = "at " + std::to_string(size) + " bytes";
-    const json* matched = rowOf(report, "OpenVDB half Blosc", group);
+    const Json* matched = rowOf(report, "OpenVDB half Blosc", group);
     ASSERT_NE(matched, nullptr) << group;
     EXPECT_FALSE((*matched)["search"].empty());
     EXPECT_GT(rowsWithin(report, group, size), 3) << group;
@@ -143,14 +121,14 @@ TEST_F(CompareTable, matchesACandidatesSizeAndShowsTheSearch) {
 }
 
 TEST_F(CompareTable, namesACommandThatMakesTheSameRow) {
-  const auto report = reportOf({"--rows", "matched", "--size", "3KB"});
-  const json* row = rowOf(report, "NanoVDB Fp8 Zip", "at 3000 bytes");
+  const auto report = reportOf("--rows matched --size 3KB");
+  const Json* row = rowOf(report, "NanoVDB Fp8 Zip", "at 3000 bytes");
   ASSERT_NE(row, nullptr);
   ASSERT_TRUE(row->contains("setting")) << row->dump();
   std::istringstream words((*row)["command"].get<std::string>());
-  std::vector<std::string> arguments;
+  Words arguments;
   for (std::string word; words >> word;) arguments.push_back(word);
-  ASSERT_THAT(std::vector<std::string>(arguments.begin(), arguments.begin() + 2),
+  ASSERT_THAT(Words(arguments.begin(), arguments.begin() + 2),
               ElementsAre("esvr-compare", "table"));
   arguments.erase(arguments.begin(), arguments.begin() + 3);
   const auto alone = reportOf(arguments);
@@ -160,8 +138,8 @@ TEST_F(CompareTable, namesACommandThatMakesTheSameRow) {
 }
 
 TEST_F(CompareTable, fitsEllipsoidsWhereAsked) {
-  const auto report = reportOf({"--rows", "none", "--fit", "2KB", "--device", "cpu"});
-  const json* row = rowOf(report, "ESVR fitted, 2000");
+  const auto report = reportOf("--rows none --fit 2KB --device cpu");
+  const Json* row = rowOf(report, "ESVR fitted, 2000");
   ASSERT_NE(row, nullptr);
   EXPECT_LE((*row)["bytes"].get<double>(), 2000);
   EXPECT_GT((*row)["psnr_box"].get<double>(), 20.0);
@@ -172,7 +150,7 @@ TEST_F(CompareTable, takesExternalResults) {
   const auto report = reportOf({"--rows", "none", "--external",
                                 "Mine=" + at("out.raw") + ":1234:9x9x9:float32:encode=4.5:fps=60",
                                 "--external", "Same=" + at("ref.vdb") + ":99"});
-  const json* mine = rowOf(report, "Mine");
+  const Json* mine = rowOf(report, "Mine");
   ASSERT_NE(mine, nullptr);
   EXPECT_EQ((*mine)["bytes"], 1234);
   EXPECT_EQ((*mine)["encode_s"], 4.5);
@@ -214,7 +192,7 @@ TEST_F(CompareTableCommand, isSearchedForASize) {
   constexpr std::uint64_t kBytes = 200;
   const auto report = reportOf(
       {"--rows", "none", "--size", std::to_string(kBytes), "--external-command", option()});
-  const json* row = rowOf(report, "Rounding", "at 200 bytes");
+  const Json* row = rowOf(report, "Rounding", "at 200 bytes");
   ASSERT_NE(row, nullptr);
   ASSERT_TRUE(row->contains("bytes")) << row->dump();
   EXPECT_LE((*row)["bytes"].get<std::uint64_t>(), kBytes);
@@ -253,7 +231,7 @@ TEST_F(CompareTableCommand, isSearchedForAPsnrOverTheActiveVoxels) {
   const auto report = reportOf({"--rows", "matched", "--psnr-active", std::to_string(kPsnr),
                                 "--external-command", option()});
   for (const char* name : {"NanoVDB FpN Zip", "NanoVDB Fp4 Zip", "Rounding"}) {
-    const json* row = rowOf(report, name, "at 30.00 dB over active voxels");
+    const Json* row = rowOf(report, name, "at 30.00 dB over active voxels");
     ASSERT_NE(row, nullptr) << name;
     ASSERT_TRUE(row->contains("psnr_active")) << row->dump();
     EXPECT_GE((*row)["psnr_active"].get<double>(), kPsnr) << name;
@@ -264,7 +242,7 @@ TEST_F(CompareTableCommand, isSearchedForAPsnrOverTheBox) {
   const auto report =
       reportOf({"--rows", "matched", "--psnr", "30", "--external-command", option()});
   for (const char* name : {"NanoVDB FpN Zip", "Rounding"}) {
-    const json* row = rowOf(report, name, "at 30.00 dB");
+    const Json* row = rowOf(report, name, "at 30.00 dB");
     ASSERT_NE(row, nullptr) << name;
     ASSERT_TRUE(row->contains("psnr_box")) << row->dump();
     EXPECT_GE((*row)["psnr_box"].get<double>(), 30.0) << name;
@@ -287,20 +265,17 @@ TEST_F(CompareTableCommand, hasALimitOnTheArray) {
 }
 
 TEST_F(CompareTable, writesReportsInEachForm) {
-  const auto run =
+  succeeded(
       table({at("ref.vdb"), at("fit.esvr"), "--rows", "lossless", "--runs", "1", "--markdown",
-             at("t.md"), "--csv", at("t.csv"), "--html", at("t.html"), "--report", at("t.json")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(test::readText(at("t.md")), AllOf(HasSubstr("| fit.esvr |"), HasSubstr("OpenVDB 1")));
-  EXPECT_THAT(test::readText(at("t.csv")),
-              HasSubstr("\nOpenVDB float Blosc,lossless,vdb-float-blosc,"));
-  EXPECT_THAT(test::readText(at("t.html")), AllOf(HasSubstr("<table"), HasSubstr("fit.esvr")));
-  EXPECT_EQ(json::parse(test::readText(at("t.json")))["schema"], "esvr-table");
+             at("t.md"), "--csv", at("t.csv"), "--html", at("t.html"), "--report", at("t.json")}));
+  EXPECT_THAT(readText(at("t.md")), Says("| fit.esvr |", "OpenVDB 1"));
+  EXPECT_THAT(readText(at("t.csv")), HasSubstr("\nOpenVDB float Blosc,lossless,vdb-float-blosc,"));
+  EXPECT_THAT(readText(at("t.html")), Says("<table", "fit.esvr"));
+  EXPECT_EQ(Json::parse(readText(at("t.json")))["schema"], "esvr-table");
 }
 
 /// Whether a row of a page has all figures of a line of a CSV file.
-bool hasRow(const std::string& page, const std::vector<std::string>& keys,
-            const std::vector<std::string>& fields) {
+bool hasRow(const std::string& page, const Words& keys, const Words& fields) {
   const std::string begin = "<th scope=\"row\">" + fields.front() + "</th>";
   for (std::size_t at = page.find("All rows"); (at = page.find(begin, at + 1)) < page.size();) {
     const std::string row = page.substr(at, page.find("</dl>", at) - at);
@@ -317,12 +292,10 @@ bool hasRow(const std::string& page, const std::vector<std::string>& keys,
 }
 
 TEST_F(CompareTable, hasEveryFigureOfTheCsvOnThePage) {
-  const auto run =
-      table({at("ref.vdb"), at("fit.esvr"), "--runs", "1", "--rows", "lossless,quantised,zfp",
-             "--csv", at("t.csv"), "--markdown", at("t.md"), "--html", at("t.html")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const std::string page = test::readText(at("t.html")), markdown = test::readText(at("t.md"));
-  const auto lines = test::csvFields(test::readText(at("t.csv")));
+  succeeded(table({at("ref.vdb"), at("fit.esvr"), "--runs", "1", "--rows", "lossless,quantised,zfp",
+                   "--csv", at("t.csv"), "--markdown", at("t.md"), "--html", at("t.html")}));
+  const std::string page = readText(at("t.html")), markdown = readText(at("t.md"));
+  const auto lines = csvFields(readText(at("t.csv")));
   ASSERT_GT(lines.size(), 20u);
   for (std::size_t line = 1; line < lines.size(); ++line) {
     EXPECT_THAT(markdown, HasSubstr("| " + lines[line].front() + " |"));
@@ -332,36 +305,32 @@ TEST_F(CompareTable, hasEveryFigureOfTheCsvOnThePage) {
 
 TEST_F(CompareTable, hasItsFindingAsTheHeadline) {
   writeRaw("good.raw", 1e-6f);
-  const auto headline = [&](const std::vector<std::string>& rows) {
-    std::vector<std::string> arguments{at("ref.vdb"), at("fit.esvr"), "--rows",
-                                       "none",        "--runs",       "1",
-                                       "--html",      at("p.html"),   "--force"};
-    arguments.insert(arguments.end(), rows.begin(), rows.end());
-    const auto run = table(arguments);
-    EXPECT_EQ(run.exitCode, 0) << run.err;
-    const std::string page = test::readText(at("p.html"));
+  const auto headline = [&](const Words& rows) {
+    succeeded(table(joined({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--runs", "1",
+                            "--html", at("p.html"), "--force"},
+                           rows)));
+    const std::string page = readText(at("p.html"));
     const std::size_t begin = page.find("<h1>") + 4;
     return page.substr(begin, page.find("</h1>") - begin);
   };
   EXPECT_THAT(headline({}), HasSubstr("; no other row is that small."));
-  EXPECT_THAT(test::readText(at("p.html")), Not(HasSubstr("best rival</h2>")));
+  EXPECT_THAT(readText(at("p.html")), Not(HasSubstr("best rival</h2>")));
   EXPECT_THAT(headline({"--external", "A<b>=" + at("good.raw") + ":10:9x9x9:float32"}),
               HasSubstr("\u00a0dB less than the best rival, A&lt;b&gt;."));
-  EXPECT_THAT(test::readText(at("p.html")), HasSubstr("ESVR and its best rival</h2>"));
+  EXPECT_THAT(readText(at("p.html")), HasSubstr("ESVR and its best rival</h2>"));
 }
 
 TEST_F(CompareTable, comparesEachFileWithItsBestRival) {
   writeRaw("good.raw", 0.001f);
-  ASSERT_EQ(test::quickFit(at("ref.vdb"), at("other.esvr")).exitCode, 0);
-  const auto run = table({at("ref.vdb"), at("fit.esvr"), at("other.esvr"), "--rows", "none",
-                          "--runs", "1", "--external", "A=" + at("good.raw") + ":10:9x9x9:float32",
-                          "--html", at("p.html"), "--csv", at("p.csv")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const std::string page = test::readText(at("p.html"));
-  EXPECT_THAT(page, AllOf(HasSubstr("<h1>ESVR has a higher PSNR than the best rival for none of 2"),
-                          HasSubstr("ESVR and its best rivals</h2>")));
+  succeeded(quickFit(at("ref.vdb"), at("other.esvr")));
+  succeeded(table({at("ref.vdb"), at("fit.esvr"), at("other.esvr"), "--rows", "none", "--runs", "1",
+                   "--external", "A=" + at("good.raw") + ":10:9x9x9:float32", "--html",
+                   at("p.html"), "--csv", at("p.csv")}));
+  const std::string page = readText(at("p.html"));
+  EXPECT_THAT(page, Says("<h1>ESVR has a higher PSNR than the best rival for none of 2",
+                         "ESVR and its best rivals</h2>"));
   // An error of 0.001 of a peak of 1 is 60 dB.
-  const double ours = std::stod(test::csvFields(test::readText(at("p.csv")))[1][6]);
+  const double ours = std::stod(csvFields(readText(at("p.csv")))[1][6]);
   EXPECT_LT(ours, 59.0);
   std::ostringstream lead;
   lead << std::fixed << std::setprecision(2) << ours - 60.0;
@@ -370,18 +339,16 @@ TEST_F(CompareTable, comparesEachFileWithItsBestRival) {
 }
 
 TEST_F(CompareTable, SlowFitsHundredColumns) {
-  const auto run = table({at("ref.vdb"), at("fit.esvr"), "--runs", "1"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(table({at("ref.vdb"), at("fit.esvr"), "--runs", "1"}));
   std::istringstream lines(run.out);
   for (std::string line; std::getline(lines, line);)
     EXPECT_TRUE(line.find(':') != std::string::npos || line.size() <= 100) << line;
 }
 
 TEST_F(CompareTable, leavesRowsThatCannotBeWithTheirReason) {
-  if (reportOf({"--rows", "none"})["versions"]["zfp"].is_null())
-    GTEST_SKIP() << "built without ZFP";
-  const auto report = reportOf({"--rows", "zfp", "--size", "2KB", "--max-dense", "100"});
-  const json* row = rowOf(report, "ZFP accuracy", "at 2000 bytes");
+  if (reportOf("--rows none")["versions"]["zfp"].is_null()) GTEST_SKIP() << "built without ZFP";
+  const auto report = reportOf("--rows zfp --size 2KB --max-dense 100");
+  const Json* row = rowOf(report, "ZFP accuracy", "at 2000 bytes");
   ASSERT_NE(row, nullptr);
   EXPECT_THAT((*row)["note"].get<std::string>(), HasSubstr("more than the bound"));
 }
@@ -389,11 +356,11 @@ TEST_F(CompareTable, leavesRowsThatCannotBeWithTheirReason) {
 TEST_F(CompareTable, SlowComparesPictures) {
   const auto report = reportOf({at("fit.esvr"), "--rows", "lossless", "--images", "2",
                                 "--image-size", "40", "--colors", "viridis:tent"});
-  const json* same = rowOf(report, "OpenVDB float Blosc");
+  const Json* same = rowOf(report, "OpenVDB float Blosc");
   EXPECT_TRUE((*same)["image_psnr"].is_null()) << "infinite";
   EXPECT_EQ((*same)["flip"], 0.0);
   EXPECT_NEAR((*same)["image_ssim"].get<double>(), 1.0, 1e-12);
-  const json* fit = rowOf(report, "fit.esvr");
+  const Json* fit = rowOf(report, "fit.esvr");
   EXPECT_GT((*fit)["flip"].get<double>(), 0.0);
   EXPECT_GT((*fit)["image_psnr"].get<double>(), 15.0);
   EXPECT_GT((*fit)["fps"].get<double>(), 0.0);
@@ -402,56 +369,53 @@ TEST_F(CompareTable, SlowComparesPictures) {
 TEST_F(CompareTable, takesLpipsFromAProgramOfTheUsers) {
   // This script takes the place of LPIPS. It prints a line that is no figure, and then 0 for equal
   // pictures and 0.25 for others. It accepts PNG files only, and the reference must come first.
-  test::writeText(at("metric.sh"),
-                  "for f; do [ \"$(head -c 4 \"$f\" | tail -c 3)\" = PNG ] || exit 9; done\n"
-                  "echo \"$# files\"; echo \"$1\" >> \"$0.references\"\n"
-                  "if cmp -s \"$1\" \"$2\"; then echo 0; else echo 0.25; fi\n");
+  writeText(at("metric.sh"),
+            "for f; do [ \"$(head -c 4 \"$f\" | tail -c 3)\" = PNG ] || exit 9; done\n"
+            "echo \"$# files\"; echo \"$1\" >> \"$0.references\"\n"
+            "if cmp -s \"$1\" \"$2\"; then echo 0; else echo 0.25; fi\n");
   const auto report = reportOf({at("fit.esvr"), "--row", "nvdb-float", "--images", "1",
                                 "--image-size", "16", "--lpips", "sh " + at("metric.sh")});
   EXPECT_EQ((*rowOf(report, "fit.esvr"))["lpips"], 0.25);
   EXPECT_EQ((*rowOf(report, "NanoVDB float raw"))["lpips"], 0.0);
-  EXPECT_THAT(test::readText(at("metric.sh.references")), Not(HasSubstr("picture.png\n")));
+  EXPECT_THAT(readText(at("metric.sh.references")), Not(HasSubstr("picture.png\n")));
   const auto run = [&](const std::string& program) {
     return table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--images", "1", "--image-size",
                   "16", "--lpips", program});
   };
   const auto failed = run("false"), wordy = run("echo no figure #");
-  EXPECT_EQ(failed.exitCode, 1);
-  EXPECT_THAT(failed.err, HasSubstr("ended with code 1"));
-  EXPECT_EQ(wordy.exitCode, 1);
-  EXPECT_THAT(wordy.err, HasSubstr("not a number"));
+  EXPECT_THAT(failed, Fails(1, "ended with code 1"));
+  EXPECT_THAT(wordy, Fails(1, "not a number"));
 }
 
 TEST_F(CompareTable, SlowPutsPicturesOnThePage) {
-  const auto run = table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--runs", "1",
-                          "--images", "1", "--image-size", "32", "--html", at("p.html")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const std::string page = test::readText(at("p.html"));
-  EXPECT_THAT(page, AllOf(HasSubstr("data:image/png;base64,"), HasSubstr("errors of fit.esvr"),
-                          HasSubstr("type=\"range\""), HasSubstr("class=\"scale\"")));
+  const auto run =
+      succeeded(table({at("ref.vdb"), at("fit.esvr"), "--rows", "none", "--runs", "1", "--images",
+                       "1", "--image-size", "32", "--html", at("p.html")}));
+  const std::string page = readText(at("p.html"));
+  EXPECT_THAT(page, Says("data:image/png;base64,", "errors of fit.esvr", "type=\"range\"",
+                         "class=\"scale\""));
   EXPECT_THAT(run.out, HasSubstr("FLIP"));
 }
 
 TEST_F(CompareTable, SlowKeepsTheRowsThatAreMadeWhenInterrupted) {
   // With this number of runs a row takes seconds. The program is interrupted when it has made one.
-  const auto run = test::runInterrupted(
+  const auto run = runInterrupted(
       ESVR_COMPARE,
       {"table", at("ref.vdb"), at("fit.esvr"), "--runs", "200", "--csv", at("t.csv"), "-v"},
       "made ESVR");
-  EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("interrupted"), HasSubstr("rows were")));
-  EXPECT_THAT(run.out, AllOf(HasSubstr("fit.esvr"), Not(HasSubstr("NanoVDB FpN/64 Zip"))));
-  EXPECT_THAT(test::readText(at("t.csv")), HasSubstr("\nfit.esvr,ESVR,"));
+  EXPECT_THAT(run, Fails(1, "interrupted", "rows were"));
+  EXPECT_THAT(run.out, Says("fit.esvr", Not(HasSubstr("NanoVDB FpN/64 Zip"))));
+  EXPECT_THAT(readText(at("t.csv")), HasSubstr("\nfit.esvr,ESVR,"));
 }
 
 class RefusedTable : public CompareTable, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedTable, isExplainedAndLeavesNoFile) {
   writeRaw("out.raw", 0.0f);
-  test::writeInput(at("zero.vdb"), {{.voxels = {{{0, 0, 0}, 0.0f}}}});
-  test::writeInput(at("none.vdb"), {{.voxels = {}}});
-  test::writeInput(at("far.vdb"), {{.voxels = softBall({100, 0, 0})}});
-  ASSERT_EQ(test::quickFit(at("far.vdb"), at("far.esvr")).exitCode, 0);
+  writeInput(at("zero.vdb"), {{.voxels = {{{0, 0, 0}, 0.0f}}}});
+  writeInput(at("none.vdb"), {{.voxels = {}}});
+  writeInput(at("far.vdb"), {{.voxels = softBall({100, 0, 0})}});
+  succeeded(quickFit(at("far.vdb"), at("far.esvr")));
   const auto before = folder_.names();
   GetParam().expectOf(table(GetParam().argumentsIn(folder_)));
   EXPECT_EQ(folder_.names(), before);
@@ -459,43 +423,40 @@ TEST_P(RefusedTable, isExplainedAndLeavesNoFile) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedTable,
-    testing::Values(
-        Refusal{{}, 2, "REF.vdb"}, Refusal{{"DIR/ref.vdb", "--rows", "best"}, 2, "best"},
-        Refusal{{"DIR/ref.vdb", "--row", "gzip"}, 2, "gzip"},
-        Refusal{{"DIR/ref.vdb", "--runs", "0"}, 2, "--runs"},
-        Refusal{{"DIR/ref.vdb", "--images", "0"}, 2, "--images"},
-        Refusal{{"DIR/ref.vdb", "--images", "1", "--colors", "mauve"}, 2, "mauve"},
-        Refusal{{"DIR/ref.vdb", "--colors", "viridis"}, 2, "--images"},
-        Refusal{{"DIR/ref.vdb", "--external", "DIR/out.raw:1"}, 2, "NAME=FILE:BYTES"},
-        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:9x9x9"}, 2, "come together"},
-        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:nine"}, 2, "nine"},
-        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:8x9x9:float32"}, 3, "(9, 9, 9)"},
-        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1:9x9x9:uint8"}, 3, "729"},
-        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/no.raw:1:9x9x9:uint8"}, 3, "no.raw"},
-        Refusal{{"DIR/ref.vdb", "--external", "A=DIR/out.raw:1"}, 3, "out.raw"},
-        Refusal{{"DIR/ref.vdb", "--external-command", "A=true"}, 2, "--size"},
-        Refusal{{"DIR/ref.vdb", "--psnr", "inf"}, 2, "--psnr"},
-        Refusal{{"DIR/ref.vdb", "--psnr-active", "-1"}, 2, "--psnr-active"},
-        Refusal{{"DIR/ref.vdb", "--psnr-active", "nan"}, 2, "--psnr-active"},
-        Refusal{{"DIR/ref.vdb", "--size", "1KB", "--external-command", "true"}, 2, "NAME=COMMAND"},
-        Refusal{{"DIR/ref.vdb", "DIR/far.esvr"}, 3, "do not meet"},
-        Refusal{{"DIR/ref.vdb", "DIR/far.vdb"}, 3, "--external"},
-        Refusal{{"DIR/ref.vdb", "DIR/no.esvr"}, 3, "no.esvr"},
-        Refusal{{"DIR/ref.vdb", "-g", "heat"}, 3, "heat"},
-        Refusal{{"DIR/none.vdb"}, 3, "active voxel"},
-        Refusal{{"DIR/ref.vdb", "--csv", "DIR/ref.vdb"}, 2, "one file"},
-        Refusal{{"DIR/ref.vdb", "--csv", "DIR/out.txt"}, 2, ".csv"}));
+    testing::Values(Refusal{{}, 2, "REF.vdb"}, Refusal{"DIR/ref.vdb --rows best", 2, "best"},
+                    Refusal{"DIR/ref.vdb --row gzip", 2, "gzip"},
+                    Refusal{"DIR/ref.vdb --runs 0", 2, "--runs"},
+                    Refusal{"DIR/ref.vdb --images 0", 2, "--images"},
+                    Refusal{"DIR/ref.vdb --images 1 --colors mauve", 2, "mauve"},
+                    Refusal{"DIR/ref.vdb --colors viridis", 2, "--images"},
+                    Refusal{"DIR/ref.vdb --external DIR/out.raw:1", 2, "NAME=FILE:BYTES"},
+                    Refusal{"DIR/ref.vdb --external A=DIR/out.raw:1:9x9x9", 2, "come together"},
+                    Refusal{"DIR/ref.vdb --external A=DIR/out.raw:1:nine", 2, "nine"},
+                    Refusal{"DIR/ref.vdb --external A=DIR/out.raw:1:8x9x9:float32", 3, "(9, 9, 9)"},
+                    Refusal{"DIR/ref.vdb --external A=DIR/out.raw:1:9x9x9:uint8", 3, "729"},
+                    Refusal{"DIR/ref.vdb --external A=DIR/no.raw:1:9x9x9:uint8", 3, "no.raw"},
+                    Refusal{"DIR/ref.vdb --external A=DIR/out.raw:1", 3, "out.raw"},
+                    Refusal{"DIR/ref.vdb --external-command A=true", 2, "--size"},
+                    Refusal{"DIR/ref.vdb --psnr inf", 2, "--psnr"},
+                    Refusal{"DIR/ref.vdb --psnr-active -1", 2, "--psnr-active"},
+                    Refusal{"DIR/ref.vdb --psnr-active nan", 2, "--psnr-active"},
+                    Refusal{"DIR/ref.vdb --size 1KB --external-command true", 2, "NAME=COMMAND"},
+                    Refusal{"DIR/ref.vdb DIR/far.esvr", 3, "do not meet"},
+                    Refusal{"DIR/ref.vdb DIR/far.vdb", 3, "--external"},
+                    Refusal{"DIR/ref.vdb DIR/no.esvr", 3, "no.esvr"},
+                    Refusal{"DIR/ref.vdb -g heat", 3, "heat"},
+                    Refusal{"DIR/none.vdb", 3, "active voxel"},
+                    Refusal{"DIR/ref.vdb --csv DIR/ref.vdb", 2, "one file"},
+                    Refusal{"DIR/ref.vdb --csv DIR/out.txt", 2, ".csv"}));
 
-test::ProgramRun curves(const std::vector<std::string>& arguments) {
-  return test::compare("curves", arguments);
-}
+ProgramRun curves(const Words& arguments) { return compare("curves", arguments); }
 
-class CompareCurves : public test::FittedBall {
+class CompareCurves : public FittedBall {
  protected:
-  [[nodiscard]] json points() const { return json::parse(test::readText(at("c.json")))["points"]; }
+  [[nodiscard]] Json points() const { return Json::parse(readText(at("c.json")))["points"]; }
 };
 
-std::set<std::string> seriesOf(const json& points) {
+std::set<std::string> seriesOf(const Json& points) {
   std::set<std::string> names;
   for (const auto& point : points) names.insert(point["series"]);
   return names;
@@ -503,9 +464,8 @@ std::set<std::string> seriesOf(const json& points) {
 
 /// A file holds no times, so only a fit that the command makes has a curve over seconds.
 TEST_F(CompareCurves, hasTheCurveOfAFitAndTheFilesOfBoth) {
-  const auto run = curves({at("ref.vdb"), at("fit.esvr"), "--fit", "3KB", "--device", "cpu",
-                           "--no-baselines", "-o", at("c")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  succeeded(curves({at("ref.vdb"), at("fit.esvr"), "--fit", "3KB", "--device", "cpu",
+                    "--no-baselines", "-o", at("c")}));
   int ofFit = 0, ofFile = 0;
   double last = 0.0;
   for (const auto& point : points()) {
@@ -518,20 +478,18 @@ TEST_F(CompareCurves, hasTheCurveOfAFitAndTheFilesOfBoth) {
   }
   EXPECT_GT(ofFit, 1);
   EXPECT_EQ(ofFile, 2);
-  EXPECT_THAT(test::readText(at("c.csv")), StartsWith("kind,series,name,bytes,seconds,"));
+  EXPECT_THAT(readText(at("c.csv")), StartsWith("kind,series,name,bytes,seconds,"));
   EXPECT_THAT(folder_.names(),
               testing::ElementsAre("c.csv", "c.html", "c.json", "fit.esvr", "ref.vdb"));
 }
 
 TEST_F(CompareCurves, hasEveryPointOnThePage) {
-  ASSERT_EQ(
-      curves({at("ref.vdb"), "--fit", "3KB", "--no-baselines", "--device", "cpu", "-o", at("c")})
-          .exitCode,
-      0);
-  const std::string page = test::readText(at("c.html"));
-  EXPECT_THAT(page, testing::AllOf(HasSubstr("<h1>At "), HasSubstr("Error over run time"),
-                                   HasSubstr("RMS error over the box, % of the peak")));
-  const auto lines = test::csvFields(test::readText(at("c.csv")));
+  succeeded(
+      curves({at("ref.vdb"), "--fit", "3KB", "--no-baselines", "--device", "cpu", "-o", at("c")}));
+  const std::string page = readText(at("c.html"));
+  EXPECT_THAT(page,
+              Says("<h1>At ", "Error over run time", "RMS error over the box, % of the peak"));
+  const auto lines = csvFields(readText(at("c.csv")));
   ASSERT_GT(lines.size(), 4u);
   for (std::size_t line = 1; line < lines.size(); ++line)
     for (const std::size_t c : {3u, 4u, 5u, 6u, 7u})  // bytes to max_error
@@ -540,12 +498,11 @@ TEST_F(CompareCurves, hasEveryPointOnThePage) {
 
 /// The values of the ball reach up to 1; a peak of 100 adds 40 dB to every figure.
 TEST_F(CompareCurves, hasOnePeakForFitsAndFiles) {
-  const auto run = curves({at("ref.vdb"), "--fit", "3KB", "--peak", "100", "--device", "cpu",
-                           "--no-baselines", "-o", at("c")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const json all = points();
+  succeeded(curves({at("ref.vdb"), "--fit", "3KB", "--peak", "100", "--device", "cpu",
+                    "--no-baselines", "-o", at("c")}));
+  const Json all = points();
   ASSERT_GT(all.size(), 2u);
-  const json &last = all[all.size() - 2], &file = all.back();
+  const Json &last = all[all.size() - 2], &file = all.back();
   ASSERT_EQ(last["kind"], "fit");
   ASSERT_EQ(file["kind"], "file");
   // Quantisation may cost some dB, but not half of those of the peak.
@@ -554,24 +511,23 @@ TEST_F(CompareCurves, hasOnePeakForFitsAndFiles) {
 }
 
 TEST_F(CompareCurves, showsOnlyThePlotsThatHaveCurves) {
-  ASSERT_EQ(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")}).exitCode, 0);
-  const std::string page = test::readText(at("c.html"));
-  EXPECT_THAT(page, testing::AllOf(HasSubstr("Error over bytes"), HasSubstr("class=\"row ours\""),
-                                   testing::Not(HasSubstr("Error over run time"))));
+  succeeded(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")}));
+  const std::string page = readText(at("c.html"));
+  EXPECT_THAT(page, Says("Error over bytes", "class=\"row ours\"",
+                         testing::Not(HasSubstr("Error over run time"))));
   EXPECT_THAT(folder_.names(),
               testing::ElementsAre("c.csv", "c.html", "c.json", "fit.esvr", "ref.vdb"));
 }
 
 TEST_F(CompareCurves, refusesWhatTakesMoreMemoryThanAllowed) {
-  const auto run = curves(
-      {at("ref.vdb"), at("fit.esvr"), "--no-baselines", "--max-memory", "1KB", "-o", at("c")});
-  EXPECT_EQ(run.exitCode, 5) << run.err;
+  EXPECT_THAT(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "--max-memory", "1KB", "-o",
+                      at("c")}),
+              Fails(5));
 }
 
 TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
-  const auto run = curves({at("ref.vdb"), "--fit", "3KB", "--fit", "5KB", "--device", "cpu",
-                           "--fps", "24", "-o", at("c")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  succeeded(curves({at("ref.vdb"), "--fit", "3KB", "--fit", "5KB", "--device", "cpu", "--fps", "24",
+                    "-o", at("c")}));
   const auto all = points();
   EXPECT_THAT(seriesOf(all), testing::IsSupersetOf({"ESVR", "NanoVDB FpN Zip"}));
   for (const auto& point : all)
@@ -579,12 +535,12 @@ TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
       EXPECT_GT(point["fps"].get<double>(), 0.0);
       EXPECT_LE(point["bytes"].get<double>(), 5000);
     }
-  EXPECT_THAT(test::readText(at("c.html")), HasSubstr("<h3>Pictures per second over bytes</h3>"));
+  EXPECT_THAT(readText(at("c.html")), HasSubstr("<h3>Pictures per second over bytes</h3>"));
 }
 
 TEST_F(CompareCurves, SlowChoosesSixSizesAndTellsThoseThatAreTooSmall) {
-  const auto run = curves({at("ref.vdb"), "--no-baselines", "--device", "cpu", "-o", at("c")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run =
+      succeeded(curves({at("ref.vdb"), "--no-baselines", "--device", "cpu", "-o", at("c")}));
   // The ball's VDB is so small that a hundredth of its size has no room for a grid.
   std::size_t files = 0, refused = 0;
   for (const auto& point : points()) files += point["kind"] == "file";
@@ -598,19 +554,19 @@ TEST_F(CompareCurves, SlowChoosesSixSizesAndTellsThoseThatAreTooSmall) {
 class RefusedCurves : public CompareCurves, public testing::WithParamInterface<Refusal> {};
 
 TEST_P(RefusedCurves, isExplainedAndLeavesNoFile) {
-  test::writeText(at("there.csv"), "precious");
+  writeText(at("there.csv"), "precious");
   GetParam().expectOf(curves(GetParam().argumentsIn(folder_)));
   EXPECT_THAT(folder_.names(), testing::ElementsAre("fit.esvr", "ref.vdb", "there.csv"));
 }
 
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedCurves,
-    testing::Values(Refusal{{}, 2, "REF.vdb"}, Refusal{{"DIR/ref.vdb"}, 2, "--output"},
-                    Refusal{{"DIR/ref.vdb", "-o", "DIR/there"}, 1, "there.csv"},
-                    Refusal{{"DIR/ref.vdb", "-o", "DIR/c", "--fps", "0"}, 2, "--fps"},
-                    Refusal{{"DIR/ref.vdb", "-o", "DIR/none/c"}, 1, "none"},
-                    Refusal{{"DIR/none.vdb", "-o", "DIR/c"}, 3, "none.vdb"},
-                    Refusal{{"DIR/ref.vdb", "DIR/none.esvr", "-o", "DIR/c"}, 3, "none.esvr"}));
+    testing::Values(Refusal{{}, 2, "REF.vdb"}, Refusal{"DIR/ref.vdb", 2, "--output"},
+                    Refusal{"DIR/ref.vdb -o DIR/there", 1, "there.csv"},
+                    Refusal{"DIR/ref.vdb -o DIR/c --fps 0", 2, "--fps"},
+                    Refusal{"DIR/ref.vdb -o DIR/none/c", 1, "none"},
+                    Refusal{"DIR/none.vdb -o DIR/c", 3, "none.vdb"},
+                    Refusal{"DIR/ref.vdb DIR/none.esvr -o DIR/c", 3, "none.esvr"}));
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -1,8 +1,6 @@
 // Plan: the commands of a document run in their order and in one folder, so that later ones find the
-// files of earlier ones. Small volumes, small pictures and few iterations make them quick. Commands
-// of other programs (./setup, cmake) are not run. Commands on smoke1.vdb are not run if
-// ESVR_DATA_DIR does not have it. The C++ program of docs/library.md writes a file of the size that it
-// names.
+// files of earlier ones, with small volumes, small pictures and few iterations. Commands of other
+// programs (./setup, cmake) are not run, and those on smoke1.vdb only if ESVR_DATA_DIR has it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -149,12 +147,11 @@ INSTANTIATE_TEST_SUITE_P(Documents, DocumentedCommands,
 using DocumentedProgram = InAFolder;
 
 TEST_F(DocumentedProgram, SlowWritesAFileOfItsSize) {
-  ASSERT_EQ(test::runProgram(ESVR_SAMPLE, {"plume", "smoke.vdb", "--resolution", "64"}).exitCode,
-            0);
+  ASSERT_EQ(test::runProgram(ESVR_SAMPLE, "plume smoke.vdb --resolution 64").exitCode, 0);
   const auto run = test::runProgram(DOCUMENTED_PROGRAM, {});
   ASSERT_EQ(run.exitCode, 0) << run.err;
   EXPECT_LE(fs::file_size("smoke.esvr"), 20'000u + 500u);  // the size is that of the grid
-  EXPECT_EQ(test::runProgram(ESVR2VDB, {"smoke.esvr", "back.vdb"}).exitCode, 0);
+  EXPECT_EQ(test::runProgram(ESVR2VDB, "smoke.esvr back.vdb").exitCode, 0);
 }
 
 }  // namespace

@@ -4,31 +4,16 @@
 // come back exactly. The PSNR of the voxels is high enough to show that the values are in the
 // right places; it is low because the fits are short.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <cstdio>
-#include <filesystem>
 
-#include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
-#include "esvr/container.h"
-#include "esvr/metrics.h"
-#include "esvr/vdb_io.h"
+#include "cli/conversion.h"
 #include "vdb/open_vdb.h"
 
 #include <openvdb/io/File.h>
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using test::esvr2vdb;
-using test::InputGrid;
-using test::InputMap;
-using test::Refusal;
-using test::softBall;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -36,27 +21,22 @@ using testing::IsSupersetOf;
 using testing::Not;
 
 /// A folder with a source file of two grids and a fit of it.
-class Esvr2Vdb : public testing::Test {
+class Esvr2Vdb : public FolderTest {
  protected:
   void SetUp() override {
-    test::writeInput(
-        source(),
-        {{.voxels = softBall({})},
-         {.name = "heat", .voxels = softBall({40, 0, 0}, 2.0f, 1.0f), .background = 1.0f}});
-    ASSERT_EQ(test::quickFit(source(), in()).exitCode, 0);
+    writeInput(source(),
+               {{.voxels = softBall({})},
+                {.name = "heat", .voxels = softBall({40, 0, 0}, 2.0f, 1.0f), .background = 1.0f}});
+    succeeded(quickFit(source(), in()));
   }
-  [[nodiscard]] std::string source() const { return folder_ / "source.vdb"; }
-  [[nodiscard]] std::string in() const { return folder_ / "in.esvr"; }
-  [[nodiscard]] std::string out() const { return folder_ / "out.vdb"; }
+  [[nodiscard]] std::string source() const { return at("source.vdb"); }
+  [[nodiscard]] std::string in() const { return at("in.esvr"); }
+  [[nodiscard]] std::string out() const { return at("out.vdb"); }
   [[nodiscard]] bool outIsThere() const { return std::filesystem::exists(out()); }
-
-  test::TemporaryFolder folder_;
 };
 
 TEST_F(Esvr2Vdb, writesAllGridsQuietly) {
-  const auto run = esvr2vdb({in(), out()});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_THAT(succeeded(esvr2vdb({in(), out()})).out, IsEmpty());
   const auto grids = inspectVdb(out()).grids;
   ASSERT_EQ(grids.size(), 2u);
   EXPECT_EQ(grids[0].name, "density");
@@ -64,7 +44,7 @@ TEST_F(Esvr2Vdb, writesAllGridsQuietly) {
 }
 
 TEST_F(Esvr2Vdb, writesTheGridsThatAreNamedOnly) {
-  ASSERT_EQ(esvr2vdb({in(), out(), "-g", "heat"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "-g", "heat"}));
   const auto grids = inspectVdb(out()).grids;
   ASSERT_EQ(grids.size(), 1u);
   EXPECT_EQ(grids[0].name, "heat");
@@ -72,16 +52,16 @@ TEST_F(Esvr2Vdb, writesTheGridsThatAreNamedOnly) {
 
 TEST_F(Esvr2Vdb, writesNanoVdbByTheEnding) {
   const std::string nano = folder_ / "out.nvdb";
-  ASSERT_EQ(esvr2vdb({in(), nano}).exitCode, 0);
+  succeeded(esvr2vdb({in(), nano}));
   EXPECT_EQ(inspectVdb(nano).format, "NanoVDB");
-  ASSERT_EQ(esvr2vdb({in(), out()}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out()}));
   EXPECT_EQ(readGrid(nano, "heat").volume.values, readGrid(out(), "heat").volume.values);
 }
 
 TEST_F(Esvr2Vdb, savesAsHalfWhereAsked) {
-  ASSERT_EQ(esvr2vdb({in(), out(), "--half", "on"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "--half", "on"}));
   EXPECT_TRUE(inspectVdb(out()).grids[0].savedAsHalf);
-  ASSERT_EQ(esvr2vdb({in(), out(), "--force"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "--force"}));
   EXPECT_FALSE(inspectVdb(out()).grids[0].savedAsHalf) << "the source was not";
 }
 
@@ -99,10 +79,9 @@ BytesRead bytesRead(const std::string& err) {
 
 TEST_F(Esvr2Vdb, writesAPartOfTheVoxelsWithoutReadingTheRest) {
   // In the compact layout, small sections are read together.
-  ASSERT_EQ(test::quickFit(source(), in(), {"--share", "off", "--force"}).exitCode, 0);
+  succeeded(quickFit(source(), in(), "--share off --force"));
   // "heat" lies 40 voxels away from "density", so its ellipsoids cannot reach the box.
-  const auto run = esvr2vdb({in(), out(), "--bbox", "-4,-4,-4,3,7,7"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(esvr2vdb({in(), out(), "--bbox", "-4,-4,-4,3,7,7"}));
   const Box box = inspectVdb(out()).grids[0].activeBox;
   EXPECT_FALSE(box.empty());
   EXPECT_TRUE((Box{{-4, -4, -4}, {3, 7, 7}}.contains(box.min)));
@@ -113,67 +92,61 @@ TEST_F(Esvr2Vdb, writesAPartOfTheVoxelsWithoutReadingTheRest) {
   EXPECT_GT(bytes.read, 0u);
   EXPECT_LT(bytes.read + 100, bytes.whole);
   const SparseVolume part = readGrid(out(), "density").volume;
-  ASSERT_EQ(esvr2vdb({in(), out(), "--force"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "--force"}));
   const SparseVolume whole = readGrid(out(), "density").volume;
   for (int x = -4; x <= 3; ++x) EXPECT_EQ(valueAt(part, {x, 1, 2}), valueAt(whole, {x, 1, 2}));
 }
 
 TEST_F(Esvr2Vdb, writesTheHeaviestEllipsoidsOnly) {
-  const auto run = esvr2vdb({in(), out(), "-g", "density", "--max-ellipsoids", "1"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  succeeded(esvr2vdb({in(), out(), "-g", "density", "--max-ellipsoids", "1"}));
   const auto few = inspectVdb(out()).grids[0].activeVoxels;
-  ASSERT_EQ(esvr2vdb({in(), out(), "-g", "density", "--lod", "1", "-f"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "-g", "density", "--lod", "1", "-f"}));
   EXPECT_LT(few, inspectVdb(out()).grids[0].activeVoxels) << "so small a file has one layer";
 }
 
 TEST_F(Esvr2Vdb, hasFewerActiveVoxelsAtAHigherThreshold) {
-  ASSERT_EQ(esvr2vdb({in(), out(), "--threshold", "0"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "--threshold", "0"}));
   const auto many = inspectVdb(out()).grids[0].activeVoxels;
-  ASSERT_EQ(esvr2vdb({in(), out(), "--threshold", "0.5", "--force"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), out(), "--threshold", "0.5", "--force"}));
   const auto few = inspectVdb(out()).grids[0].activeVoxels;
   EXPECT_LT(few, many);
   EXPECT_GT(few, 0u);
 }
 
 TEST_F(Esvr2Vdb, saysSoWhereAThresholdLeavesNothing) {
-  const auto run = esvr2vdb({in(), out(), "-g", "density", "--threshold", "100"});
-  EXPECT_EQ(run.exitCode, 0);
-  EXPECT_THAT(run.err, HasSubstr("comes back without an active voxel"));
+  EXPECT_THAT(succeeded(esvr2vdb({in(), out(), "-g", "density", "--threshold", "100"})).err,
+              HasSubstr("comes back without an active voxel"));
 }
 
 TEST_F(Esvr2Vdb, printsTheErrorAgainstAReference) {
-  const auto run = esvr2vdb({in(), out(), "--reference", source()});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(esvr2vdb({in(), out(), "--reference", source()}));
   for (const char* word : {"PSNR box", "PSNR T 0.5", "SSIM", "IoU", "mass ref", "density", "heat"})
     EXPECT_THAT(run.out, HasSubstr(word));
 }
 
 TEST_F(Esvr2Vdb, wantsEveryGridInTheReferenceBeforeItWrites) {
-  test::writeInput(folder_ / "other.vdb", {{.voxels = softBall({})}});
-  const auto run = esvr2vdb({in(), out(), "--reference", folder_ / "other.vdb"});
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("other.vdb"), HasSubstr("heat")));
+  writeInput(folder_ / "other.vdb", {{.voxels = softBall({})}});
+  EXPECT_THAT(esvr2vdb({in(), out(), "--reference", folder_ / "other.vdb"}),
+              Fails(3, "other.vdb", "heat"));
   EXPECT_FALSE(outIsThere());
 }
 
 TEST_F(Esvr2Vdb, listsGridsAndSections) {
-  const auto run = esvr2vdb({"--list", in()});
-  EXPECT_EQ(run.exitCode, 0);
+  const auto run = succeeded(esvr2vdb({"--list", in()}));
   for (const char* word : {"density", "heat", "fog volume", "threshold", "ellipsoids"})
     EXPECT_THAT(run.out, HasSubstr(word));
   EXPECT_THAT(esvr2vdb({"--list", in(), "-v"}).out, HasSubstr("creator"));
 }
 
 TEST_F(Esvr2Vdb, listsTheGridsOfAVdb) {
-  ASSERT_EQ(esvr2vdb({in(), folder_ / "out.nvdb"}).exitCode, 0);
+  succeeded(esvr2vdb({in(), folder_ / "out.nvdb"}));
   for (const std::string& file : {source(), std::string(folder_ / "out.nvdb")}) {
-    const auto run = esvr2vdb({"--list", file});
-    EXPECT_EQ(run.exitCode, 0) << run.err;
+    const auto run = succeeded(esvr2vdb({"--list", file}));
     for (const char* word : {"density", "heat", "fog volume", "float", "active voxels", "bytes"})
       EXPECT_THAT(run.out, HasSubstr(word)) << file;
   }
   const auto details = esvr2vdb({"--list", source(), "-v"});
-  EXPECT_THAT(details.out, AllOf(HasSubstr("creator"), HasSubstr("active box (")));
+  EXPECT_THAT(details.out, Says("creator", "active box ("));
   const auto grids = inspectVdb(source()).grids;
   EXPECT_THAT(details.out, HasSubstr(std::to_string(grids[0].activeVoxels)));
   EXPECT_GT(grids[0].storedBytes, 100u);
@@ -208,15 +181,13 @@ TEST_F(Esvr2Vdb, listsWhoMadeAFileItsFrameRateAndItsUnits) {
   plain->tree().setValue({0, 0, 0}, 1.0f);
   const std::string vdb = folder_ / "units.vdb", esvr = folder_ / "units.esvr";
   openvdb::io::File(vdb).write({gridWithUnits("ct"), plain, gridWithUnits("dose")}, metadata);
-  ASSERT_EQ(test::vdb2esvr({vdb, esvr, "--lossless", "--keep", "dose"}).exitCode, 0);
-  for (const std::string& file : {vdb, esvr}) {
-    const auto run = esvr2vdb({"--list", file});
-    EXPECT_EQ(run.exitCode, 0) << run.err;
-    EXPECT_THAT(run.out, AllOf(HasSubstr(" bytes\nFrame_Rate 23.98, creator a?program\n\n"),
-                               HasSubstr("\nct, dose: length_unit mm, timeUnits 0.5\n"),
-                               Not(HasSubstr("plain:")), Not(HasSubstr("none"))))
+  succeeded(vdb2esvr({vdb, esvr, "--lossless", "--keep", "dose"}));
+  for (const std::string& file : {vdb, esvr})
+    EXPECT_THAT(succeeded(esvr2vdb({"--list", file})).out,
+                Says(" bytes\nFrame_Rate 23.98, creator a?program\n\n",
+                     "\nct, dose: length_unit mm, timeUnits 0.5\n", Not(HasSubstr("plain:")),
+                     Not(HasSubstr("none"))))
         << file;
-  }
 }
 
 TEST_F(Esvr2Vdb, listsTheFrameRateOfASequence) {
@@ -227,16 +198,13 @@ TEST_F(Esvr2Vdb, listsTheFrameRateOfASequence) {
     openvdb::io::File(folder_ / ("f." + std::to_string(frame) + ".vdb"))
         .write({gridWithUnits("ct")}, metadata);
   const std::string pattern = folder_ / "f.@.vdb", file = folder_ / "f.esvr";
-  ASSERT_EQ(test::vdb2esvr({pattern, file, "--lossless"}).exitCode, 0);
+  succeeded(vdb2esvr({pattern, file, "--lossless"}));
   EXPECT_THAT(esvr2vdb({"--list", pattern}).out, HasSubstr(" a file each\nfps 24\n\n"));
-  EXPECT_THAT(esvr2vdb({"--list", file}).out,
-              AllOf(HasSubstr(" groups\nfps 24\n\n"), HasSubstr("\nct: length_unit mm")));
+  EXPECT_THAT(esvr2vdb({"--list", file}).out, Says(" groups\nfps 24\n\n", "\nct: length_unit mm"));
 }
 
 TEST_F(Esvr2Vdb, saysThatNanoVdbHoldsNoMetadata) {
-  const auto nano = esvr2vdb({in(), folder_ / "out.nvdb"});
-  EXPECT_EQ(nano.exitCode, 0);
-  EXPECT_THAT(nano.err, AllOf(HasSubstr("warning"), HasSubstr("metadata")));
+  EXPECT_THAT(succeeded(esvr2vdb({in(), folder_ / "out.nvdb"})).err, Says("warning", "metadata"));
   EXPECT_THAT(esvr2vdb({in(), out()}).err, Not(HasSubstr("metadata")));
 }
 
@@ -260,31 +228,23 @@ void writeHugeScale(const std::string& path) {
 TEST_F(Esvr2Vdb, refusesWhatNeedsMoreMemoryThanAllowed) {
   const std::string huge = folder_ / "huge.esvr";
   writeHugeScale(huge);
-  for (const char* limit : {"1GB", "20MB"}) {
-    const auto run = esvr2vdb({huge, out(), "--max-memory", limit});
-    EXPECT_EQ(run.exitCode, 5);
-    EXPECT_THAT(run.err,
-                AllOf(HasSubstr("smoke"), HasSubstr("GB of memory"), HasSubstr("--max-memory")));
-  }
+  for (const char* limit : {"1GB", "20MB"})
+    EXPECT_THAT(esvr2vdb({huge, out(), "--max-memory", limit}),
+                Fails(5, "smoke", "GB of memory", "--max-memory"));
   EXPECT_FALSE(outIsThere());
-  EXPECT_EQ(esvr2vdb({in(), out(), "--max-memory", "1KB"}).exitCode, 5);
-  EXPECT_EQ(esvr2vdb({in(), out(), "--max-memory", "few"}).exitCode, 2);
-  EXPECT_EQ(esvr2vdb({in(), out(), "--max-memory", "1GB"}).exitCode, 0);
-  const auto part =
-      esvr2vdb({huge, folder_ / "part.vdb", "--bbox", "0,0,0,31,31,31", "--max-memory", "100MB"});
-  EXPECT_EQ(part.exitCode, 0) << part.err;
+  EXPECT_THAT(esvr2vdb({in(), out(), "--max-memory", "1KB"}), Fails(5));
+  EXPECT_THAT(esvr2vdb({in(), out(), "--max-memory", "few"}), Fails(2));
+  succeeded(esvr2vdb({in(), out(), "--max-memory", "1GB"}));
+  succeeded(
+      esvr2vdb({huge, folder_ / "part.vdb", "--bbox", "0,0,0,31,31,31", "--max-memory", "100MB"}));
 }
 
 TEST_F(Esvr2Vdb, checksAFile) {
-  const auto good = esvr2vdb({"--check", in()});
-  EXPECT_EQ(good.exitCode, 0);
-  EXPECT_THAT(good.out, HasSubstr("in.esvr: OK\n"));
-  std::string bytes = test::readText(in());
+  EXPECT_THAT(succeeded(esvr2vdb({"--check", in()})).out, HasSubstr("in.esvr: OK\n"));
+  std::string bytes = readText(in());
   bytes[bytes.size() / 2] ^= 1;
-  test::writeText(in(), bytes);
-  const auto damaged = esvr2vdb({"--check", in()});
-  EXPECT_EQ(damaged.exitCode, 3);
-  EXPECT_THAT(damaged.err, HasSubstr("in.esvr"));
+  writeText(in(), bytes);
+  EXPECT_THAT(esvr2vdb({"--check", in()}), Fails(3, "in.esvr"));
 }
 
 class RefusedRun : public Esvr2Vdb, public testing::WithParamInterface<Refusal> {};
@@ -296,40 +256,35 @@ TEST_P(RefusedRun, isExplainedAndLeavesNoFile) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, RefusedRun,
-    testing::Values(
-        Refusal{{}, 2, "IN.esvr"}, Refusal{{"DIR/in.esvr"}, 2, "OUT.vdb"},
-        Refusal{{"DIR/in.esvr", "DIR/out.txt"}, 2, ".vdb or .nvdb"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--threshold", "-1"}, 2, "--threshold"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--half", "maybe"}, 2, "maybe"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--box", "0,0,0,1,1,1"}, 2, "--reference"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--list"}, 2, "--list"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--lod", "0"}, 2, "--lod"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--max-ellipsoids", "-1"}, 2, "--max-ellipsoids"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--bbox", "1,2,3"}, 2, "bbox"},
-        Refusal{{"--check", "DIR/in.esvr", "--lod", "1"}, 2, "--check"},
-        Refusal{{"--list", "--check", "DIR/in.esvr"}, 2, "two jobs"},
-        Refusal{{"DIR/none.esvr", "DIR/out.vdb"}, 3, "none.esvr"},
-        Refusal{{"DIR/source.vdb", "DIR/out.vdb"}, 3, "source.vdb"},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "-g", "smoke"}, 3, "\"density\""},
-        Refusal{{"DIR/in.esvr", "DIR/out.vdb", "--reference", "DIR/none.vdb"}, 3, "none.vdb"},
-        Refusal{{"DIR/in.esvr", "DIR/none/out.vdb"}, 1, "none/out.vdb"}));
+    testing::Values(Refusal{{}, 2, "IN.esvr"}, Refusal{"DIR/in.esvr", 2, "OUT.vdb"},
+                    Refusal{"DIR/in.esvr DIR/out.txt", 2, ".vdb or .nvdb"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --threshold -1", 2, "--threshold"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --half maybe", 2, "maybe"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --box 0,0,0,1,1,1", 2, "--reference"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --list", 2, "--list"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --lod 0", 2, "--lod"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --max-ellipsoids -1", 2, "--max-ellipsoids"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --bbox 1,2,3", 2, "bbox"},
+                    Refusal{"--check DIR/in.esvr --lod 1", 2, "--check"},
+                    Refusal{"--list --check DIR/in.esvr", 2, "two jobs"},
+                    Refusal{"DIR/none.esvr DIR/out.vdb", 3, "none.esvr"},
+                    Refusal{"DIR/source.vdb DIR/out.vdb", 3, "source.vdb"},
+                    Refusal{"DIR/in.esvr DIR/out.vdb -g smoke", 3, "\"density\""},
+                    Refusal{"DIR/in.esvr DIR/out.vdb --reference DIR/none.vdb", 3, "none.vdb"},
+                    Refusal{"DIR/in.esvr DIR/none/out.vdb", 1, "none/out.vdb"}));
 
 TEST_F(Esvr2Vdb, keepsAnExistingFileUnlessForced) {
-  test::writeText(out(), "precious");
-  const auto refused = esvr2vdb({in(), out()});
-  EXPECT_EQ(refused.exitCode, 1);
-  EXPECT_THAT(refused.err, HasSubstr("--force"));
-  EXPECT_EQ(test::readText(out()), "precious");
-  EXPECT_EQ(esvr2vdb({in(), out(), "-f"}).exitCode, 0);
+  writeText(out(), "precious");
+  EXPECT_THAT(esvr2vdb({in(), out()}), Fails(1, "--force"));
+  EXPECT_EQ(readText(out()), "precious");
+  succeeded(esvr2vdb({in(), out(), "-f"}));
 }
 
 TEST_F(Esvr2Vdb, leavesNothingOnAFullDisk) {
-  for (const std::string name : {"out.vdb", "out.nvdb"}) {
-    const auto run =
-        test::runOnFullDisk(std::string(ESVR2VDB) + " " + in() + " " + (folder_ / name).string());
-    EXPECT_EQ(run.exitCode, 1) << name;
-    EXPECT_THAT(run.err, HasSubstr(name));
-  }
+  for (const std::string name : {"out.vdb", "out.nvdb"})
+    EXPECT_THAT(runOnFullDisk(std::string(ESVR2VDB) + " " + in() + " " + (folder_ / name).string()),
+                Fails(1, name))
+        << name;
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "source.vdb"));
 }
 
@@ -348,27 +303,17 @@ void expectSameFrame(const GridDescriptor& back, const GridDescriptor& source) {
   EXPECT_THAT(back.metadata, IsSupersetOf(source.metadata));
 }
 
-class ThereAndBack : public testing::TestWithParam<Journey> {
- protected:
-  void SetUp() override { test::writeInput(source(), {GetParam().grid}); }
-  [[nodiscard]] std::string source() const { return folder_ / "in.vdb"; }
-  [[nodiscard]] std::string fitted() const { return folder_ / "in.esvr"; }
-  [[nodiscard]] std::string back() const { return folder_ / "back.vdb"; }
-
-  test::TemporaryFolder folder_;
-};
+class ThereAndBack : public Conversion, public testing::WithParamInterface<Journey> {};
 
 TEST_P(ThereAndBack, keepsAllThatIsNotVoxelsAndTheVoxelsAsFitted) {
-  const auto fit = test::quickFit(source(), fitted());
-  ASSERT_EQ(fit.exitCode, 0) << fit.err;
-  const auto decode = test::esvr2vdb({fitted(), back()});
-  ASSERT_EQ(decode.exitCode, 0) << decode.err;
-  EXPECT_THAT(folder_.names(), ElementsAre("back.vdb", "in.esvr", "in.vdb"));
+  writeInput(in(), {GetParam().grid});
+  succeeded(fitQuickly());
+  convertBack();
+  EXPECT_THAT(folder_.names(), ElementsAre("back.vdb", "in.vdb", "out.esvr"));
 
-  const VolumeGrid before = readGrid(source(), "density"), after = readGrid(back(), "density");
+  const VolumeGrid before = readGrid(in(), "density"), after = readGrid(back(), "density");
   expectSameFrame(after.descriptor, before.descriptor);
-  EXPECT_THAT(inspectVdb(back()).metadata,
-              testing::Contains(stringItem("creator", test::kInputCreator)));
+  EXPECT_THAT(inspectVdb(back()).metadata, testing::Contains(stringItem("creator", kInputCreator)));
   EXPECT_GE(compareVolumes(before.volume, after.volume).psnrActive, GetParam().lowestPsnr);
 }
 
@@ -417,28 +362,24 @@ INSTANTIATE_TEST_SUITE_P(
                     Journey{"a sheared map", ballUnder(InputMap::kSheared), kAlike},
                     Journey{"a frustum", ballUnder(InputMap::kFrustum), kAlike}));
 
-TEST(LevelSet, withActiveVoxelsBeyondItsBandComesBackUnchanged) {
-  const test::TemporaryFolder folder;
-  const std::string source = folder / "in.vdb", fitted = folder / "in.esvr";
-  test::writeInput(source, {{.voxels = test::distances(12), .background = 1.0f, .levelSet = true}});
-  const auto fit = test::vdb2esvr({source, fitted, "--count", "300", "--iterations", "300"});
-  ASSERT_EQ(fit.exitCode, 0) << fit.err;
-  const auto back = test::esvr2vdb({fitted, folder / "back.vdb"});
-  ASSERT_EQ(back.exitCode, 0) << back.err;
-  const VolumeMetrics m = compareVolumes(readGrid(source, "density").volume,
-                                         readGrid(folder / "back.vdb", "density").volume);
+using LevelSet = Conversion;
+
+TEST_F(LevelSet, withActiveVoxelsBeyondItsBandComesBackUnchanged) {
+  writeInput(in(), {{.voxels = distances(12), .background = 1.0f, .levelSet = true}});
+  thereAndBack("--count 300 --iterations 300");
+  const VolumeMetrics m =
+      compareVolumes(readGrid(in(), "density").volume, readGrid(back(), "density").volume);
   EXPECT_GT(m.psnrActive, kAlike);
 }
 
 TEST(ShiftedVolume, givesTheSameVoxelsElsewhere) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const Coord shift{1 << 20, -(1 << 20), 1 << 20};
-  test::writeInput(folder / "here.vdb", {ball({})});
-  test::writeInput(folder / "there.vdb", {ball(shift)});
+  writeInput(folder / "here.vdb", {ball({})});
+  writeInput(folder / "there.vdb", {ball(shift)});
   for (const std::string name : {"here", "there"}) {
-    ASSERT_EQ(test::quickFit(folder / (name + ".vdb"), folder / (name + ".esvr")).exitCode, 0);
-    ASSERT_EQ(test::esvr2vdb({folder / (name + ".esvr"), folder / (name + "_back.vdb")}).exitCode,
-              0);
+    succeeded(quickFit(folder / (name + ".vdb"), folder / (name + ".esvr")));
+    succeeded(esvr2vdb({folder / (name + ".esvr"), folder / (name + "_back.vdb")}));
   }
   const SparseVolume here = readGrid(folder / "here_back.vdb", "density").volume;
   const SparseVolume there = readGrid(folder / "there_back.vdb", "density").volume;
@@ -449,4 +390,4 @@ TEST(ShiftedVolume, givesTheSameVoxelsElsewhere) {
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -41,21 +41,20 @@ class EsvrRender : public testing::Test {
     return d;
   }
   /// Draws a small picture unless `more` has a resolution.
-  ProgramRun draw(const std::string& input, const std::string& output,
-                  std::vector<std::string> more = {}) {
+  ProgramRun draw(const std::string& input, const std::string& output, Words more = {}) {
     more.insert(more.begin(), {folder_ / input, folder_ / output});
     if (std::find(more.begin(), more.end(), "--resolution") == more.end())
       more.insert(more.end(), {"--resolution", "64x48"});
     return runProgram(ESVR_RENDER, more);
   }
-  Pixels picture(const std::string& input, const std::vector<std::string>& more = {}) {
+  Pixels picture(const std::string& input, const Words& more = {}) {
     auto arguments = more;
     arguments.emplace_back("-f");
     const auto run = draw(input, "out.png", arguments);
     EXPECT_EQ(run.exitCode, 0) << run.err;
     return readPng(folder_ / "out.png");
   }
-  void expectRefused(const std::vector<std::string>& more, int exitCode, const std::string& why) {
+  void expectRefused(const Words& more, int exitCode, const std::string& why) {
     const auto run = draw("in.esvr", "refused.png", more);
     EXPECT_EQ(run.exitCode, exitCode) << run.err;
     EXPECT_THAT(run.err, testing::HasSubstr(why));

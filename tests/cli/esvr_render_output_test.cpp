@@ -1,24 +1,12 @@
-// Plan: the files that a separate process writes are read back with libpng, OpenEXR and a JSON
-// reader: pictures, distances, comparisons with a reference and measured speeds. A separate
-// process draws a blob with and without a color bar. The tests compare the pictures, and look for
-// the unit in the part of the picture that has the texts. A separate process draws turntables into
-// files, folders and videos. A script stands for ffmpeg and keeps the pixels or the arguments that
-// it gets. esvr-render is run with options that are wrong, with input that it cannot draw, and
-// with pictures that are too large. The tests check the exit code and the message.
+// Plan: the files that a separate process writes are read back with libpng, OpenEXR and a JSON reader.
+// A script stands for ffmpeg and keeps the pixels or the arguments that it gets.
 
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
-
-#include <cmath>
-#include <filesystem>
-#include <nlohmann/json.hpp>
-#include <vector>
 
 #include "cli/esvr_render_fixture.h"
 #include "esvr/transfer_function.h"
@@ -27,7 +15,6 @@
 namespace esvr::test {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -47,8 +34,7 @@ std::vector<float> readExr(const std::filesystem::path& path, const char* channe
 }
 
 TEST_F(EsvrRender, WritesAPictureOfTheSizeAskedForAndSaysSo) {
-  const auto run = draw("in.esvr", "out.png");
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(draw("in.esvr", "out.png"));
   EXPECT_EQ(run.out, "");
   EXPECT_THAT(run.err, HasSubstr("density, 64 x 48"));
   const auto pixels = readPng(folder_ / "out.png");
@@ -58,14 +44,14 @@ TEST_F(EsvrRender, WritesAPictureOfTheSizeAskedForAndSaysSo) {
 }
 
 TEST_F(EsvrRender, ThePictureHoldsItsCommandLine) {
-  ASSERT_EQ(draw("in.esvr", "out.png", {"--colors", "magma"}).exitCode, 0);
+  succeeded(draw("in.esvr", "out.png", {"--colors", "magma"}));
   const std::string bytes = readText(folder_ / "out.png");
   EXPECT_THAT(bytes, HasSubstr("out.png --colors magma --resolution 64x48"));
   EXPECT_THAT(bytes, HasSubstr("esvr-render 0."));
 }
 
 TEST_F(EsvrRender, APngMayHave16BitsAChannel) {
-  ASSERT_EQ(draw("in.esvr", "out.png", {"--bits", "16"}).exitCode, 0);
+  succeeded(draw("in.esvr", "out.png", {"--bits", "16"}));
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
   ASSERT_NE(png_image_begin_read_from_file(&header, (folder_ / "out.png").c_str()), 0);
@@ -74,7 +60,7 @@ TEST_F(EsvrRender, APngMayHave16BitsAChannel) {
 }
 
 TEST_F(EsvrRender, AnExrHasTheSamePictureInLinearLight) {
-  ASSERT_EQ(draw("in.esvr", "out.exr", {"--colors", "grayscale"}).exitCode, 0);
+  succeeded(draw("in.esvr", "out.exr", {"--colors", "grayscale"}));
   const auto red = readExr(folder_ / "out.exr", "R"), alpha = readExr(folder_ / "out.exr", "A");
   const auto png = picture("in.esvr", {"--colors", "grayscale"});
   ASSERT_EQ(red.size(), 64u * 48u);
@@ -89,8 +75,8 @@ TEST_F(EsvrRender, AnExrHasTheSamePictureInLinearLight) {
 }
 
 TEST_F(EsvrRender, DistancesAreWrittenWhereLightStops) {
-  const std::vector<std::string> more{"--depth", folder_ / "z.exr", "--opacity-length", "0.5"};
-  ASSERT_EQ(draw("in.esvr", "out.png", more).exitCode, 0);
+  const Words more{"--depth", folder_ / "z.exr", "--opacity-length", "0.5"};
+  succeeded(draw("in.esvr", "out.png", more));
   const auto depth = readExr(folder_ / "z.exr", "Z");
   EXPECT_TRUE(std::isinf(depth[0])) << "a corner that shows nothing";
   EXPECT_GT(depth[24 * 64 + 32], 10.0f);
@@ -98,33 +84,29 @@ TEST_F(EsvrRender, DistancesAreWrittenWhereLightStops) {
 }
 
 TEST_F(EsvrRender, KeepsAPictureThatIsThere) {
-  ASSERT_EQ(draw("in.esvr", "out.png").exitCode, 0);
+  succeeded(draw("in.esvr", "out.png"));
   const auto before = readText(folder_ / "out.png");
-  const auto again = draw("in.esvr", "out.png", {"--colors", "magma"});
-  EXPECT_EQ(again.exitCode, 1);
-  EXPECT_THAT(again.err, HasSubstr("--force"));
+  EXPECT_THAT(draw("in.esvr", "out.png", {"--colors", "magma"}), Fails(1, "--force"));
   EXPECT_EQ(readText(folder_ / "out.png"), before);
 }
 
 TEST_F(EsvrRender, ComparesWithAReference) {
-  const auto run = draw("in.esvr", "out.png",
-                        {"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json",
-                         "--sheet", folder_ / "sheet.png"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  succeeded(draw("in.esvr", "out.png",
+                 {"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json", "--sheet",
+                  folder_ / "sheet.png"}));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "out.error.png"));
   EXPECT_EQ(readPng(folder_ / "sheet.png").header.width, 3u * 64u);
-  const auto report = nlohmann::json::parse(readText(folder_ / "report.json"));
+  const auto report = Json::parse(readText(folder_ / "report.json"));
   EXPECT_GT(report["comparisons"][0]["psnr"], 30.0);
   EXPECT_GT(report["comparisons"][0]["ssim"], 0.9);
 }
 
 TEST_F(EsvrRender, ComparesWithAReferenceOfManyRays) {
-  const auto psnr = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> all{"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json",
-                                 "-f"};
-    all.insert(all.end(), more.begin(), more.end());
-    EXPECT_EQ(draw("in.vdb", "out.png", all).exitCode, 0);
-    const auto report = nlohmann::json::parse(readText(folder_ / "report.json"));
+  const auto psnr = [&](const Words& more) {
+    succeeded(draw(
+        "in.vdb", "out.png",
+        joined({"--ref", folder_ / "in.vdb", "--report", folder_ / "report.json", "-f"}, more)));
+    const auto report = Json::parse(readText(folder_ / "report.json"));
     return report["comparisons"][0]["psnr"];
   };
   EXPECT_TRUE(psnr({}).is_null()) << "the same picture: an infinite PSNR";
@@ -136,11 +118,10 @@ TEST_F(EsvrRender, ComparesWithAReferenceOfManyRays) {
 }
 
 TEST_F(EsvrRender, MeasuresWithoutKeepingAPicture) {
-  const auto run =
+  const auto run = succeeded(
       runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--turntable", "3", "--resolution",
-                               "64x48", "--ref", folder_ / "in.vdb", "--report", "-", "-q"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  const auto report = nlohmann::json::parse(run.out);
+                               "64x48", "--ref", folder_ / "in.vdb", "--report", "-", "-q"}));
+  const auto report = Json::parse(run.out);
   EXPECT_EQ(report["views"], 3);
   EXPECT_GT(report["drawn"]["fps_median"], 0.0);
   EXPECT_GE(report["drawn"]["fps_median"], report["drawn"]["fps_1_percent_low"]);
@@ -152,8 +133,7 @@ TEST_F(EsvrRender, MeasuresWithoutKeepingAPicture) {
 }
 
 TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {
-  const auto help = runProgram(ESVR_RENDER, {"--help"});
-  EXPECT_EQ(help.exitCode, 0);
+  const auto help = succeeded(runProgram(ESVR_RENDER, {"--help"}));
   for (const auto& name : builtInColorMaps()) EXPECT_THAT(help.out, HasSubstr(name));
   for (const auto& name : builtInOpacities()) EXPECT_THAT(help.out, HasSubstr(name));
 }
@@ -161,9 +141,8 @@ TEST_F(EsvrRender, HelpNamesEveryBuiltInFunction) {
 class EsvrRenderLegend : public EsvrRender {
  protected:
   /// A camera that is given, so that the bar does not move it.
-  static std::vector<std::string> withLegend(bool legend) {
-    std::vector<std::string> options{"--orthographic", "--height", "60", "--resolution",
-                                     "120x200",        "--step",   "4"};
+  static Words withLegend(bool legend) {
+    Words options{"--orthographic", "--height", "60", "--resolution", "120x200", "--step", "4"};
     if (legend) options.emplace_back("--legend");
     return options;
   }
@@ -197,12 +176,11 @@ bool hasGap(const Pixels& picture) {
 }
 
 TEST_F(EsvrRenderLegend, LeavesRoomForItself) {
-  const std::vector<std::string> opaque{"--legend", "--resolution", "200x200", "--opacity-length",
-                                        "0.01"};
+  const Words opaque{"--legend", "--resolution", "200x200", "--opacity-length", "0.01"};
   EXPECT_TRUE(hasGap(picture("in.esvr", opaque)));
   auto large = opaque;
-  large.insert(large.end(), {"--orthographic", "--height", "15"});
-  EXPECT_FALSE(hasGap(picture("in.esvr", large))) << "the volume lies behind the bar";
+  EXPECT_FALSE(hasGap(picture("in.esvr", joined(large, {"--orthographic", "--height", "15"}))))
+      << "the volume lies behind the bar";
 }
 
 TEST_F(EsvrRenderLegend, ShowsTheUnitOfTheGrid) {
@@ -220,9 +198,10 @@ TEST_F(EsvrRenderLegend, ShowsTheUnitOfTheGrid) {
 TEST_F(EsvrRenderLegend, DoesNotCountInComparisons) {
   const auto psnr = [&](bool legend) {
     auto more = withLegend(legend);
-    more.insert(more.end(), {"--ref", folder_ / "in.vdb", "--report", folder_ / "r.json", "-f"});
-    EXPECT_EQ(draw("in.esvr", "out.png", more).exitCode, 0);
-    const auto report = nlohmann::json::parse(readText(folder_ / "r.json"));
+    succeeded(
+        draw("in.esvr", "out.png",
+             joined(more, {"--ref", folder_ / "in.vdb", "--report", folder_ / "r.json", "-f"})));
+    const auto report = Json::parse(readText(folder_ / "r.json"));
     return report["comparisons"][0]["psnr"].get<double>();
   };
   EXPECT_EQ(psnr(true), psnr(false));
@@ -235,10 +214,8 @@ TEST_F(EsvrRenderLegend, FitsIntoTinyPictures) {
 }
 
 TEST_F(EsvrRenderLegend, IsRefusedWhereItCannotBeDrawn) {
-  const auto exr = draw("in.esvr", "out.exr", {"--legend"});
-  EXPECT_EQ(exr.exitCode, 2);
-  EXPECT_THAT(exr.err, HasSubstr("--legend"));
-  EXPECT_EQ(runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--legend"}).exitCode, 2);
+  EXPECT_THAT(draw("in.esvr", "out.exr", {"--legend"}), Fails(2, "--legend"));
+  EXPECT_THAT(runProgram(ESVR_RENDER, {folder_ / "in.esvr", "--bench", "--legend"}), Fails(2));
 }
 
 class EsvrRenderTurn : public EsvrRender {
@@ -250,12 +227,11 @@ class EsvrRenderTurn : public EsvrRender {
 
 TEST_F(EsvrRenderTurn, AVideoHasThePicturesOfTheFiles) {
   useFfmpeg("cat > \"$out\"");
-  const std::vector<std::string> turn{"--turntable", "3", "--background", "0,0,0"};
-  const auto run = draw("in.esvr", "turn.mp4", turn);
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("3 pictures, 0.1 s of video"));
+  const Words turn{"--turntable", "3", "--background", "0,0,0"};
+  EXPECT_THAT(succeeded(draw("in.esvr", "turn.mp4", turn)).err,
+              HasSubstr("3 pictures, 0.1 s of video"));
   std::string expected;
-  ASSERT_EQ(draw("in.esvr", "turn.png", turn).exitCode, 0);
+  succeeded(draw("in.esvr", "turn.png", turn));
   for (const char* file : {"turn.0000.png", "turn.0001.png", "turn.0002.png"}) {
     const Pixels picture = readPng(folder_ / file);
     for (std::size_t i = 0; i < picture.rgba.size(); ++i)
@@ -266,7 +242,7 @@ TEST_F(EsvrRenderTurn, AVideoHasThePicturesOfTheFiles) {
 
 TEST_F(EsvrRenderTurn, FfmpegGetsTheRateAndTheCommandLine) {
   useFfmpeg("cat > /dev/null; echo \"$@\" > \"$out\"");
-  ASSERT_EQ(draw("in.esvr", "turn.webm", {"--turntable", "2", "--fps", "12.5"}).exitCode, 0);
+  succeeded(draw("in.esvr", "turn.webm", {"--turntable", "2", "--fps", "12.5"}));
   const std::string arguments = readText(folder_ / "turn.webm");
   EXPECT_THAT(arguments, HasSubstr("-framerate 12.5 "));
   EXPECT_THAT(arguments, HasSubstr("64x48"));
@@ -275,34 +251,28 @@ TEST_F(EsvrRenderTurn, FfmpegGetsTheRateAndTheCommandLine) {
 
 TEST_F(EsvrRenderTurn, NothingIsLeftOfAVideoThatFails) {
   useFfmpeg("cat > /dev/null; echo Unknown encoder >&2; exit 1");
-  const auto run = draw("in.esvr", "turn.mp4", {"--turntable", "2"});
-  EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, HasSubstr("turn.mp4: ffmpeg: Unknown encoder"));
+  EXPECT_THAT(draw("in.esvr", "turn.mp4", {"--turntable", "2"}),
+              Fails(1, "turn.mp4: ffmpeg: Unknown encoder"));
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb"));
 }
 
 TEST_F(EsvrRenderTurn, AnInterruptedVideoLeavesNothing) {
   useFfmpeg("exec sleep 60");
-  const auto run = runInterrupted(ESVR_RENDER, {folder_ / "in.esvr", folder_ / "turn.mp4",
-                                                "--turntable", "9999", "--resolution", "64x48"});
-  EXPECT_EQ(run.exitCode, 1);
-  EXPECT_THAT(run.err, HasSubstr("interrupted; nothing was written"));
+  EXPECT_THAT(runInterrupted(ESVR_RENDER, {folder_ / "in.esvr", folder_ / "turn.mp4", "--turntable",
+                                           "9999", "--resolution", "64x48"}),
+              Fails(1, "interrupted; nothing was written"));
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb"));
 }
 
 TEST_F(EsvrRenderTurn, AVideoWithoutFfmpegIsRefused) {
   path_.hideOthers();
-  const auto run = draw("in.esvr", "turn.mp4", {"--turntable", "2"});
-  EXPECT_EQ(run.exitCode, 2);
-  EXPECT_THAT(run.err, HasSubstr("install"));
+  EXPECT_THAT(draw("in.esvr", "turn.mp4", {"--turntable", "2"}), Fails(2, "install"));
 }
 
 TEST_F(EsvrRenderTurn, WhatAVideoCannotBeIsRefused) {
   useFfmpeg("cat > \"$out\"");
-  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
-    const auto run = draw("in.esvr", "turn.mp4", std::move(more));
-    EXPECT_EQ(run.exitCode, 2);
-    EXPECT_THAT(run.err, HasSubstr(why));
+  const auto refused = [&](Words more, const std::string& why) {
+    EXPECT_THAT(draw("in.esvr", "turn.mp4", std::move(more)), Fails(2, why));
     EXPECT_FALSE(std::filesystem::exists(folder_ / "turn.mp4"));
   };
   refused({}, "--turntable");
@@ -314,22 +284,20 @@ TEST_F(EsvrRenderTurn, WhatAVideoCannotBeIsRefused) {
 }
 
 TEST_F(EsvrRenderTurn, APatternOrAFolderNamesThePictures) {
-  const std::vector<std::string> turn{"--turntable", "2"};
-  ASSERT_EQ(draw("in.esvr", "a_%02d_b.png", turn).exitCode, 0);
+  const Words turn{"--turntable", "2"};
+  succeeded(draw("in.esvr", "a_%02d_b.png", turn));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "a_00_b.png"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "a_01_b.png"));
-  ASSERT_EQ(draw("in.esvr", "new/", turn).exitCode, 0);
-  ASSERT_EQ(draw("in.esvr", "new", {"--turntable", "3", "--frames", "2-2"}).exitCode, 0);
+  succeeded(draw("in.esvr", "new/", turn));
+  succeeded(draw("in.esvr", "new", {"--turntable", "3", "--frames", "2-2"}));
   for (const char* file : {"frame.0000.png", "frame.0001.png", "frame.0002.png"})
     EXPECT_TRUE(std::filesystem::exists(folder_ / "new" / file)) << file;
-  EXPECT_EQ(draw("in.esvr", "new").exitCode, 2) << "a single picture needs a name";
+  EXPECT_THAT(draw("in.esvr", "new"), Fails(2)) << "a single picture needs a name";
 }
 
 TEST_F(EsvrRenderTurn, DistancesAreFilesBesideAVideo) {
   useFfmpeg("cat > \"$out\"");
-  ASSERT_EQ(
-      draw("in.esvr", "turn.mp4", {"--turntable", "2", "--depth", folder_ / "z_%d.exr"}).exitCode,
-      0);
+  succeeded(draw("in.esvr", "turn.mp4", {"--turntable", "2", "--depth", folder_ / "z_%d.exr"}));
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb", "turn.mp4", "z_0.exr", "z_1.exr"));
 }
 
@@ -381,27 +349,23 @@ TEST_F(EsvrRender, InputThatCannotBeDrawnIsRefused) {
   expectRefused({"--camera", folder_ / "cam.json"}, 3, "three numbers");
   writeText(folder_ / "cam.json", R"({"eyes": [1, 2, 3]})");
   expectRefused({"--camera", folder_ / "cam.json"}, 3, "eyes");
-  EXPECT_EQ(draw("missing.esvr", "refused.png").exitCode, 3);
-  EXPECT_EQ(draw("missing.vdb", "refused.png").exitCode, 3);
+  EXPECT_THAT(draw("missing.esvr", "refused.png"), Fails(3));
+  EXPECT_THAT(draw("missing.vdb", "refused.png"), Fails(3));
   writeText(folder_ / "bad.esvr", "nothing of the kind");
-  EXPECT_EQ(draw("bad.esvr", "refused.png").exitCode, 3);
-  EXPECT_EQ(draw("in.esvr", "refused.jpg").exitCode, 2);
+  EXPECT_THAT(draw("bad.esvr", "refused.png"), Fails(3));
+  EXPECT_THAT(draw("in.esvr", "refused.jpg"), Fails(2));
 }
 
 TEST_F(EsvrRender, PicturesBeyondTheMemoryAllowedAreRefused) {
   const auto large =
       draw("in.esvr", "large.png", {"--resolution", "30000x30000", "--max-memory", "1GB"});
-  EXPECT_EQ(large.exitCode, 5);
-  EXPECT_THAT(large.err, AllOf(HasSubstr("30000 x 30000"), HasSubstr("43.2 GB")));
-  EXPECT_EQ(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}).exitCode, 2);
+  EXPECT_THAT(large, Fails(5, "30000 x 30000", "43.2 GB"));
+  EXPECT_THAT(draw("in.esvr", "large.png", {"--resolution", "100000x100000"}), Fails(2));
 }
 
 TEST_F(EsvrRender, TwoOutputsAreNeverOneFile) {
-  const std::vector<std::string> reference{"--ref", folder_ / "in.vdb"};
-  const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.end(), reference.begin(), reference.end());
-    return more;
-  };
+  const Words reference{"--ref", folder_ / "in.vdb"};
+  const auto with = [&](const Words& more) { return joined(more, reference); };
   expectRefused(with({"--sheet", folder_ / "refused.png"}), 2, "are one file");
   expectRefused(with({"--sheet", folder_ / "refused.error.png"}), 2, "are one file");
   std::filesystem::create_symlink(folder_ / "in.vdb", folder_ / "link.png");
@@ -415,11 +379,10 @@ TEST_F(EsvrRender, APipeWithoutAWriterIsRefusedSlow) {
 }
 
 TEST_F(EsvrRender, ACameraMayComeThroughAPipe) {
-  const auto run = runProgram(
+  succeeded(runProgram(
       "/bin/bash", {"-c", std::string(ESVR_RENDER) + " - " + (folder_ / "out.png").string() +
                               " --resolution 16x16 --camera <(echo '{\"eye\": [1, 2, 90]}') < " +
-                              (folder_ / "in.esvr").string()});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+                              (folder_ / "in.esvr").string()}));
 }
 
 }  // namespace

@@ -1,20 +1,8 @@
-// Plan: a blob is drawn from an .esvr and from a .vdb file by a separate process. Pictures that
-// must be equal or alike are compared with each other, and so are pictures that an option must
-// change. A separate process draws a blob from given places and on a turntable. The tests find the
-// blob in the pictures, and they compare pictures of one camera that is given in two ways. A
-// separate process draws a density together with a heat that has other voxels. The pictures of the
-// .esvr file and of the VDB file agree; each part of a look changes the picture; a grid that emits
-// hides nothing; what several grids do not have is refused. A separate process draws a blob by
-// each method. The folder golden/ has the expected pictures, with which the tests compare the
-// results.
+// Plan: pictures of a blob that must be equal or alike are compared with each other, and so are pictures
+// that an option must change; cameras are tested by where the blob is in a picture. The folder golden/
+// has the expected pictures of each method.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <cstdlib>
-#include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "cli/esvr_render_fixture.h"
 #include "esvr/quantised.h"
@@ -30,14 +18,14 @@ using testing::Not;
 TEST_F(EsvrRender, EllipsoidsLookLikeTheirVoxels) {
   // Bytes may differ by one. The background is black, because the color of an almost transparent
   // pixel is not well defined.
-  const std::vector<std::string> black{"--background", "0,0,0"};
+  const Words black{"--background", "0,0,0"};
   EXPECT_GE(psnrOf(picture("in.esvr", black), picture("in.vdb", black)), 60.0);
 }
 
 TEST_F(EsvrRender, TheSumIsShownBetweenVoxelsWhereAskedFor) {
   // Between the voxels of blobs with scales of 4 voxels, trilinear interpolation differs from the
   // sum by a few percent.
-  const std::vector<std::string> black{"--background", "0,0,0"};
+  const Words black{"--background", "0,0,0"};
   const Pixels sum = picture("in.esvr", {"--background", "0,0,0", "--between", "sum"});
   EXPECT_GE(psnrOf(sum, picture("in.vdb", black)), 35.0);
   EXPECT_NE(sum.rgba, picture("in.esvr", black).rgba);
@@ -50,8 +38,7 @@ TEST_F(EsvrRender, ValuesThatPicturesDoNotTellApartHaveAWarning) {
   for (const float factor : {1e-30f, 1e-10f}) {
     for (float& v : grid.volume.values) v *= factor;
     writeGrids(folder_ / "tiny.vdb", {}, std::span(&grid, 1), {.overwrite = true});
-    const ProgramRun run = draw("tiny.vdb", "tiny.png", {"-f"});
-    EXPECT_EQ(run.exitCode, 0);
+    const auto run = succeeded(draw("tiny.vdb", "tiny.png", {"-f"}));
     const bool isWarned = run.err.find(warning) != std::string::npos;
     EXPECT_EQ(isWarned, factor == 1e-10f) << "values of 1e-40 after the second factor";
   }
@@ -65,8 +52,7 @@ TEST_F(EsvrRender, AGridWithoutASumIsDrawnFromItsVoxelsWithAWarning) {
   EXPECT_EQ(readPng(folder_ / "vdb.png").rgba, readPng(folder_ / "plain.png").rgba);
   for (const char* name : {"f.1.vdb", "f.2.vdb"})
     std::filesystem::copy_file(folder_ / "in.vdb", folder_ / name);
-  const auto frames = draw("f.@.vdb", "f.@.png", {"--between", "sum"});
-  EXPECT_EQ(frames.exitCode, 0) << frames.err;
+  const auto frames = succeeded(draw("f.@.vdb", "f.@.png", {"--between", "sum"}));
   const auto at = frames.err.find(warning);
   ASSERT_NE(at, std::string::npos);
   EXPECT_EQ(frames.err.find(warning, at + 1), std::string::npos) << "once for all frames";
@@ -96,8 +82,8 @@ TEST_F(EsvrRender, EllipsoidsFarApartAreDrawnAsTheirVoxels) {
     return std::to_string(e.center[0][7]) + "," + std::to_string(e.center[1][7]) + "," +
            std::to_string(e.center[2][7] + away);
   };
-  const std::vector<std::string> near{"--eye",        place(60.0), "--center", place(0.0),
-                                      "--background", "0,0,0",     "--device", "cpu"};
+  const Words near{"--eye",        place(60.0), "--center", place(0.0),
+                   "--background", "0,0,0",     "--device", "cpu"};
   auto sum = near;
   sum.insert(sum.end(), {"--between", "sum"});
   const Pixels expected = picture("far.vdb", near);
@@ -166,7 +152,7 @@ TEST_F(EsvrRender, ALevelSetIsAnOpaqueBodyUnlessAnOptionSaysOtherwise) {
   EXPECT_EQ(body.at(32, 24)[3], 255);
   EXPECT_THAT(body.corner(), ElementsAre(0, 0, 0, 0));
   const auto saved = folder_ / "tf.json";
-  EXPECT_EQ(draw("surface.vdb", "again.png", {"--tf-save", saved}).exitCode, 0);
+  succeeded(draw("surface.vdb", "again.png", {"--tf-save", saved}));
   EXPECT_EQ(picture("surface.vdb", {"--tf", saved, "--range", "own"}).rgba, body.rgba);
   for (const char* option : {"--colors", "--opacity"})
     EXPECT_NE(picture("surface.vdb", {option, option[2] == 'c' ? "viridis" : "linear"}).rgba,
@@ -227,11 +213,10 @@ TEST_F(EsvrRender, TheClassificationChangesThePicture) {
 }
 
 TEST_F(EsvrRender, LevelsOfDetailChangePicturesOfWidePixels) {
-  const std::vector<std::string> wide{"--orthographic", "--height", "600"};
+  const Words wide{"--orthographic", "--height", "600"};
   const auto drawn = [&](const std::string& lod) {
     auto more = wide;
-    more.insert(more.end(), {"--lod", lod});
-    return picture("in.esvr", more).rgba;
+    return picture("in.esvr", joined(more, {"--lod", lod})).rgba;
   };
   EXPECT_EQ(drawn("auto"), picture("in.esvr", wide).rgba) << "the default";
   EXPECT_NE(drawn("auto"), drawn("off"));
@@ -259,9 +244,9 @@ TEST_F(EsvrRender, PartsOfTheDepthAndMemoryChangeNothingOnGpu) {
   EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--depth-parts", "3"}), usual), 48.0);
   EXPECT_GE(psnrOf(picture("in.esvr", {"--device", "cuda", "--max-vram", "1"}), usual), 48.0);
   // A row of tiles of the widest picture takes more than 1 MB.
-  const auto refused = draw("in.esvr", "none.png",
-                            {"--device", "cuda", "--max-vram", "0.001", "--resolution", "32767x8"});
-  EXPECT_EQ(refused.exitCode, 5) << refused.err;
+  EXPECT_THAT(draw("in.esvr", "none.png",
+                   {"--device", "cuda", "--max-vram", "0.001", "--resolution", "32767x8"}),
+              Fails(5));
 }
 
 TEST_F(EsvrRender, TheNumberOfThreadsChangesNothing) {
@@ -287,8 +272,7 @@ TEST_F(EsvrRender, ACameraFileIsReplacedByOptions) {
   writeText(folder_ / "cam.json", R"({"eye": [-90, 15, 15], "center": [15, 15, 15],
                                       "up": [0, 0, 1], "fov": 25})");
   const auto file = picture("in.esvr", {"--camera", folder_ / "cam.json"});
-  const std::vector<std::string> same{"--eye", "-90,15,15", "--center", "15,15,15",
-                                      "--up",  "0,0,1",     "--fov",    "25"};
+  const Words same{"--eye", "-90,15,15", "--center", "15,15,15", "--up", "0,0,1", "--fov", "25"};
   EXPECT_EQ(file.rgba, picture("in.esvr", same).rgba);
   EXPECT_NE(picture("in.esvr", {"--camera", folder_ / "cam.json", "--fov", "50"}).rgba, file.rgba);
   writeText(folder_ / "flat.json", R"({"height": 60})");
@@ -297,18 +281,18 @@ TEST_F(EsvrRender, ACameraFileIsReplacedByOptions) {
 }
 
 TEST_F(EsvrRender, ATurntableWritesAPictureForEveryAngle) {
-  ASSERT_EQ(draw("in.esvr", "turn.png", {"--turntable", "3"}).exitCode, 0);
+  succeeded(draw("in.esvr", "turn.png", {"--turntable", "3"}));
   EXPECT_THAT(folder_.names(),
               ElementsAre("in.esvr", "in.vdb", "turn.0000.png", "turn.0001.png", "turn.0002.png"));
   const auto first = readPng(folder_ / "turn.0000.png");
-  ASSERT_EQ(draw("in.esvr", "once.png", {"--turntable", "1"}).exitCode, 0);
+  succeeded(draw("in.esvr", "once.png", {"--turntable", "1"}));
   EXPECT_EQ(first.rgba, readPng(folder_ / "once.0000.png").rgba) << "the same distance";
   EXPECT_NE(first.rgba, readPng(folder_ / "turn.0001.png").rgba);
 }
 
 TEST_F(EsvrRender, SomeFramesOfATurntableAreThoseOfTheWhole) {
-  ASSERT_EQ(draw("in.esvr", "all.png", {"--turntable", "3"}).exitCode, 0);
-  ASSERT_EQ(draw("in.esvr", "part.png", {"--turntable", "3", "--frames", "1-1"}).exitCode, 0);
+  succeeded(draw("in.esvr", "all.png", {"--turntable", "3"}));
+  succeeded(draw("in.esvr", "part.png", {"--turntable", "3", "--frames", "1-1"}));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "part.0000.png"));
   EXPECT_EQ(readPng(folder_ / "part.0001.png").rgba, readPng(folder_ / "all.0001.png").rgba);
 }
@@ -348,12 +332,11 @@ class EsvrRenderGrids : public EsvrRender {
 };
 
 TEST_F(EsvrRenderGrids, LookAlikeFromBothFiles) {
-  const auto run =
+  const auto run = succeeded(
       draw("two.esvr", "both.png",
-           {"--with", "heat", "--ref", folder_ / "two.vdb", "--report", folder_ / "r.json"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+           {"--with", "heat", "--ref", folder_ / "two.vdb", "--report", folder_ / "r.json"}));
   EXPECT_THAT(run.out + run.err, HasSubstr("density + heat"));
-  const auto report = nlohmann::json::parse(readText(folder_ / "r.json"));
+  const auto report = Json::parse(readText(folder_ / "r.json"));
   // The stored threshold decides about a few faint voxels.
   EXPECT_GT(report["comparisons"][0]["psnr"].get<double>(), 50.0);
 }
@@ -375,10 +358,10 @@ TEST_F(EsvrRenderGrids, EachPartOfALookChangesThePicture) {
 }
 
 TEST_F(EsvrRenderGrids, EmissionIsThereInATransparentPicture) {
-  const std::vector<std::string> usual{"--opacity-length", "9"};
+  const Words usual{"--opacity-length", "9"};
   auto glowing = usual;
-  glowing.insert(glowing.end(), {"--with", "heat:emission"});
-  const Pixels plain = picture("two.esvr", usual), glow = picture("two.esvr", glowing);
+  const Pixels plain = picture("two.esvr", usual),
+               glow = picture("two.esvr", joined(glowing, {"--with", "heat:emission"}));
   // The fitted cameras differ by the box of the heat, so that only the sums are compared.
   const auto lit = [](const Pixels& p) {
     long sum = 0;
@@ -399,10 +382,8 @@ TEST_F(EsvrRenderGrids, TheCameraSeesAllGrids) {
 }
 
 TEST_F(EsvrRenderGrids, AreRefusedWhereTheyCannotBeDrawn) {
-  const auto refused = [&](std::vector<std::string> more, int code, const std::string& why) {
-    const auto run = draw("two.esvr", "refused.png", std::move(more));
-    EXPECT_EQ(run.exitCode, code) << run.err;
-    EXPECT_THAT(run.err, HasSubstr(why));
+  const auto refused = [&](Words more, int code, const std::string& why) {
+    EXPECT_THAT(draw("two.esvr", "refused.png", std::move(more)), Fails(code, why));
     EXPECT_FALSE(std::filesystem::exists(folder_ / "refused.png"));
   };
   refused({"--with", "cold"}, 3, "cold");
@@ -423,7 +404,7 @@ TEST_F(EsvrRenderGrids, AreRefusedWhereTheyCannotBeDrawn) {
 /// The options with which the blob is drawn.
 struct Golden {
   const char *name, *input;
-  std::vector<std::string> options;
+  Words options;
 };
 std::ostream& operator<<(std::ostream& out, const Golden& golden) { return out << golden.name; }
 
@@ -439,8 +420,8 @@ class GoldenPicture : public EsvrRender, public testing::WithParamInterface<Gold
 // ESVR_UPDATE_GOLDEN=1 stores the pictures of this machine after an intended change.
 TEST_P(GoldenPicture, isDrawnAgain) {
   auto options = GetParam().options;
-  options.insert(options.end(), {"--device", "cpu", "--resolution", "48x48"});
-  const Pixels found = picture(GetParam().input, options);
+  const Pixels found =
+      picture(GetParam().input, joined(options, {"--device", "cpu", "--resolution", "48x48"}));
   if (std::getenv("ESVR_UPDATE_GOLDEN"))
     std::filesystem::copy_file(folder_ / "out.png", golden(),
                                std::filesystem::copy_options::overwrite_existing);

@@ -2,12 +2,8 @@
 // signals end it. The command that it names makes the picture that it sends. It refuses what it
 // cannot serve before it listens.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <chrono>
 #include <csignal>
-#include <filesystem>
 #include <functional>
 #include <regex>
 #include <thread>
@@ -23,8 +19,6 @@ namespace esvr::test {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -39,7 +33,7 @@ bool becomesTrue(const std::function<bool()>& condition) {
 /// A running server, which is killed at the end of the test.
 class ViewProgram {
  public:
-  explicit ViewProgram(const std::vector<std::string>& arguments) : program_(ESVR_VIEW, arguments) {
+  explicit ViewProgram(const Words& arguments) : program_(ESVR_VIEW, arguments) {
     (void)becomesTrue([&] { return program_.out().ends_with("\n") || !program_.runs(); });
     std::smatch parts;
     const std::string out = program_.out();
@@ -64,11 +58,9 @@ class ViewProgram {
 class EsvrView : public testing::Test {
  protected:
   [[nodiscard]] std::string at(const std::string& name) const { return files_ / name; }
-  static void expectRefused(const std::vector<std::string>& arguments, int exitCode,
-                            const std::string& why) {
-    const ProgramRun run = runProgram(ESVR_VIEW, arguments);
-    EXPECT_EQ(run.exitCode, exitCode) << run.err;
-    EXPECT_THAT(run.err, HasSubstr(why));
+  static void expectRefused(const Words& arguments, int exitCode, const std::string& why) {
+    const auto run = runProgram(ESVR_VIEW, arguments);
+    EXPECT_THAT(run, Fails(exitCode, why));
     EXPECT_THAT(run.out, IsEmpty());
   }
   const ViewFiles files_;
@@ -76,8 +68,8 @@ class EsvrView : public testing::Test {
 
 TEST_F(EsvrView, HelpAndVersionNeedNoFiles) {
   for (const char* option : {"--help", "-h"})
-    EXPECT_THAT(runProgram(ESVR_VIEW, {option}).out, AllOf(HasSubstr("Usage:"), HasSubstr("ssh")));
-  EXPECT_THAT(runProgram(ESVR_VIEW, {"--version"}).out, HasSubstr("esvr-view 0."));
+    EXPECT_THAT(runProgram(ESVR_VIEW, {option}).out, Says("Usage:", "ssh"));
+  EXPECT_THAT(runProgram(ESVR_VIEW, "--version").out, HasSubstr("esvr-view 0."));
 }
 
 TEST_F(EsvrView, ServesAtTheAddressThatItPrintsUntilASignal) {
@@ -86,7 +78,7 @@ TEST_F(EsvrView, ServesAtTheAddressThatItPrintsUntilASignal) {
     EXPECT_EQ(program.host(), "127.0.0.1");
     ViewClient client(program.address());
     EXPECT_EQ(client.draw(drawMessage(1)).back().head["type"], "picture");
-    EXPECT_EQ(program.endBy(signal).exitCode, 0);
+    succeeded(program.endBy(signal));
     EXPECT_THROW((void)client.receive(), SocketClosed);
   }
 }
@@ -94,12 +86,12 @@ TEST_F(EsvrView, ServesAtTheAddressThatItPrintsUntilASignal) {
 TEST_F(EsvrView, EndsInTheMiddleOfAPicture) {
   ViewProgram program({at("blob.vdb"), "--device", "cpu"});
   ViewClient client(program.address());
-  json message = drawMessage(1, {{"step", 0.05}, {"opacityLength", 1e5}});
+  Json message = drawMessage(1, {{"step", 0.05}, {"opacityLength", 1e5}});
   message["width"] = message["height"] = 2000;
   client.send(message);
   EXPECT_EQ(client.receive().head["last"], false);
   const auto begin = std::chrono::steady_clock::now();
-  EXPECT_EQ(program.endBy(SIGINT).exitCode, 0);
+  succeeded(program.endBy(SIGINT));
   // Without cancelling, the passes take a minute.
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
 }
@@ -134,20 +126,20 @@ TEST_F(EsvrView, SendsClientsAwayThatAreTooMany) {
 TEST_F(EsvrView, TheCommandMakesThePictureOfThePngFile) {
   const ViewProgram program({at("blob.esvr"), at("frames.esvr"), "--device", "cpu"});
   ViewClient client(program.address());
-  const json view{{"eye", {40, 20, 50}}, {"center", {8, 8, 8}}, {"fov", 40}};
-  const json transfer{{"colors", {{0.0, 0, 0, 1}, {2.0, 1, 1, 0}}},
+  const Json view{{"eye", {40, 20, 50}}, {"center", {8, 8, 8}}, {"fov", 40}};
+  const Json transfer{{"colors", {{0.0, 0, 0, 1}, {2.0, 1, 1, 0}}},
                       {"opacity", {{0.0, 0, 0.5, 0}, {0.5, 0.9, 0.5, 0}, {2.0, 0.2, 0.5, 0}}}};
-  for (const json& scene :
-       std::vector<json>{{{"camera", view}},
+  for (const Json& scene :
+       std::vector<Json>{{{"camera", view}},
                          {{"transfer", transfer}, {"opacityLength", 3}},
                          {{"file", 1}, {"frame", 9}, {"shade", true}},
                          {{"slice", {{"axis", "y"}, {"place", 8}}}},
                          {{"clip", {{2, 2, 2}, {9, 9, 9}}}, {"background", {0, 0.5, 1}}},
                          {{"mode", "maximum"}, {"lod", "off"}, {"between", "sum"}}}) {
-    json png = drawMessage(1, scene);
+    Json png = drawMessage(1, scene);
     png["type"] = "png";
     writeText(at("sent.png"), client.ask(png).bytes);
-    const json command = client
+    const Json command = client
                              .ask({{"type", "command"},
                                    {"width", png["width"]},
                                    {"height", png["height"]},
@@ -156,10 +148,9 @@ TEST_F(EsvrView, TheCommandMakesThePictureOfThePngFile) {
     if (!command["transfer"].is_null()) writeText(at("transfer.json"), command["transfer"]);
     const std::string folder = fs::path(at("x")).parent_path();
     const ProgramRun run =
-        runProgram("/bin/sh", {"-c", "cd '" + folder + "' && PATH='" +
-                                         fs::path(ESVR_RENDER).parent_path().string() + ":'$PATH " +
-                                         command["text"].get<std::string>() +
-                                         " --device cpu --force && mv picture*.png made.png"});
+        runShell("cd '" + folder + "' && PATH='" + fs::path(ESVR_RENDER).parent_path().string() +
+                 ":'$PATH " + command["text"].get<std::string>() +
+                 " --device cpu --force && mv picture*.png made.png");
     ASSERT_EQ(run.exitCode, 0) << command << run.err;
     EXPECT_EQ(readPng(at("made.png")).rgba, readPng(at("sent.png")).rgba) << command;
   }
@@ -174,15 +165,14 @@ TEST_F(EsvrView, OpensThePageByAFileThatOnlyItsOwnerCanRead) {
   EXPECT_EQ(readText(at("mode")), "600\n");
   EXPECT_THAT(readText(at("page")), HasSubstr("url=http://" + program.address().host() + "/" +
                                               program.address().token + "/\""));
-  EXPECT_EQ(program.endBy(SIGINT).exitCode, 0);
+  succeeded(program.endBy(SIGINT));
 }
 
 TEST_F(EsvrView, NeedsAProgramToOpenThePage) {
   const SearchPath path;
   path.hideOthers();
-  const ProgramRun run = runProgram(ESVR_VIEW, {at("blob.esvr"), "--open"});
-  EXPECT_EQ(run.exitCode, 2);
-  EXPECT_THAT(run.err, HasSubstr("--open needs the program xdg-open"));
+  EXPECT_THAT(runProgram(ESVR_VIEW, {at("blob.esvr"), "--open"}),
+              Fails(2, "--open needs the program xdg-open"));
 }
 
 TEST_F(EsvrView, PrintsTheAddressAloneWhereQuiet) {
@@ -216,9 +206,8 @@ TEST_F(EsvrView, RefusesWhatItCannotServe) {
 using EsvrViewExport = EsvrView;
 
 TEST_F(EsvrViewExport, WritesAPageWithTheFile) {
-  const ProgramRun run = runProgram(ESVR_VIEW, {"--export", at("page.html"), at("blob.esvr")});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("page.html"));
+  EXPECT_THAT(succeeded(runProgram(ESVR_VIEW, {"--export", at("page.html"), at("blob.esvr")})).err,
+              HasSubstr("page.html"));
   const std::string page = readText(at("page.html"));
   // The magic number of .esvr files and the first byte of their version, in base64.
   const std::string magic = readText(at("blob.esvr")).substr(0, 6);
@@ -232,8 +221,7 @@ TEST_F(EsvrViewExport, KeepsAPageThatIsThereUnlessForced) {
   writeText(at("page.html"), "mine");
   expectRefused({"--export", at("page.html"), at("blob.esvr")}, 1, "page.html");
   EXPECT_EQ(readText(at("page.html")), "mine");
-  EXPECT_EQ(runProgram(ESVR_VIEW, {"--export", at("page.html"), at("blob.esvr"), "-f"}).exitCode,
-            0);
+  succeeded(runProgram(ESVR_VIEW, {"--export", at("page.html"), at("blob.esvr"), "-f"}));
   EXPECT_NE(readText(at("page.html")), "mine");
 }
 

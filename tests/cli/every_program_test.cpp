@@ -3,28 +3,18 @@
 // Commands that need no device must not look for CUDA's driver; a conversion on a GPU must, which
 // shows that the messages are complete.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cstdlib>
-#include <ostream>
 #include <regex>
 #include <sstream>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
 #include "esvr/device.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using test::softBall;
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
@@ -32,8 +22,7 @@ using testing::Not;
 struct ProgramCommand {
   const char* name;
   const char* path;
-  std::vector<std::string>
-      arguments;  ///< arguments of a run of milliseconds; "DIR/x" is in the test's folder
+  Words arguments;  ///< arguments of a run of milliseconds; "DIR/x" is in the test's folder
 };
 std::ostream& operator<<(std::ostream& out, const ProgramCommand& program) {
   return out << program.name;
@@ -41,81 +30,72 @@ std::ostream& operator<<(std::ostream& out, const ProgramCommand& program) {
 
 /// The lines that a program printed, without numbers, which may be times as short as 1e-05 seconds,
 /// and without the spaces and dashes of tables, whose widths depend on them.
-std::vector<std::string> linesOf(const test::ProgramRun& run) {
+Words linesOf(const ProgramRun& run) {
   static const std::regex numbers("[0-9][0-9.]*(e[-+][0-9]+)?");
   std::string text = std::regex_replace(run.out + run.err, numbers, "");
   std::erase_if(text,
                 [](char c) { return std::string_view(" .-").find(c) != std::string_view::npos; });
-  std::vector<std::string> lines;
+  Words lines;
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
   return lines;
 }
 
-class EveryProgram : public test::FolderTest, public testing::WithParamInterface<ProgramCommand> {
+class EveryProgram : public FolderTest, public testing::WithParamInterface<ProgramCommand> {
  protected:
   void SetUp() override {
-    test::writeInput(at("in.vdb"), {{.voxels = softBall({})}});
-    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+    writeInput(at("in.vdb"), {{.voxels = softBall({})}});
+    succeeded(quickFit(at("in.vdb"), at("in.esvr")));
   }
-  [[nodiscard]] test::ProgramRun run(const std::vector<std::string>& more) const {
-    std::vector<std::string> arguments = GetParam().arguments;
+  [[nodiscard]] ProgramRun run(const Words& more) const {
+    Words arguments = GetParam().arguments;
     for (auto& argument : arguments)
       if (argument.starts_with("DIR/")) argument = at(argument.substr(4));
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    auto result = test::runProgram(GetParam().path, arguments);
-    EXPECT_EQ(result.exitCode, 0) << result.err;
+    const auto result = succeeded(runProgram(GetParam().path, joined(arguments, more)));
     return result;
   }
   /// The command of a program that has several.
-  [[nodiscard]] std::vector<std::string> job() const {
+  [[nodiscard]] Words job() const {
     if (std::string(GetParam().path) != ESVR_COMPARE) return {};
     return {GetParam().arguments[0]};
   }
 };
 
 TEST_P(EveryProgram, helpAndVersionNeedNoFiles) {
-  std::vector<std::string> job = this->job();
+  Words job = this->job();
   for (const char* option : {"--help", "-h"}) {
     auto arguments = job;
     arguments.emplace_back(option);
-    EXPECT_THAT(test::runProgram(GetParam().path, arguments).out,
-                AllOf(HasSubstr("Usage:"), HasSubstr("--version")));
+    EXPECT_THAT(runProgram(GetParam().path, arguments).out, Says("Usage:", "--version"));
   }
   job.emplace_back("--version");
-  EXPECT_THAT(test::runProgram(GetParam().path, job).out,
-              AllOf(HasSubstr("0."), HasSubstr("OpenVDB")));
+  EXPECT_THAT(runProgram(GetParam().path, job).out, Says("0.", "OpenVDB"));
 }
 
 TEST_P(EveryProgram, helpFitsOnTwoScreens) {
   constexpr std::ptrdiff_t kTwoScreens = 100;  // lines
-  std::vector<std::string> arguments = job();
+  Words arguments = job();
   arguments.emplace_back("--help");
-  const std::string help = test::runProgram(GetParam().path, arguments).out;
+  const std::string help = runProgram(GetParam().path, arguments).out;
   EXPECT_LE(std::ranges::count(help, '\n'), kTwoScreens);
 }
 
 TEST_P(EveryProgram, saysNothingWhereQuietAndMoreWhereVerbose) {
-  const auto quiet = run({"--quiet"}), usual = run({}), verbose = run({"--verbose"});
+  const auto quiet = run("--quiet"), usual = run({}), verbose = run("--verbose");
   EXPECT_THAT(quiet.out + quiet.err, IsEmpty());
   EXPECT_THAT(linesOf(verbose), testing::IsSupersetOf(linesOf(usual)));
 }
 
 TEST_P(EveryProgram, takesANumberOfThreads) {
-  (void)run({"--threads", "1"});
+  (void)run("--threads 1");
   auto arguments = GetParam().arguments;
-  arguments.insert(arguments.end(), {"--threads", "0"});
-  const auto none = test::runProgram(GetParam().path, arguments);
-  EXPECT_EQ(none.exitCode, 2);
-  EXPECT_THAT(none.err, HasSubstr("threads"));
+  EXPECT_THAT(runProgram(GetParam().path, joined(arguments, "--threads 0")), Fails(2, "threads"));
 }
 
 TEST_P(EveryProgram, saysWhichOptionAMistypedOneMayBe) {
   auto arguments = job();
-  arguments.insert(arguments.end(), {"--thraeds", "1"});
-  const auto typed = test::runProgram(GetParam().path, arguments);
-  EXPECT_EQ(typed.exitCode, 2);
-  EXPECT_THAT(typed.err, AllOf(HasSubstr("--thraeds"), HasSubstr("; did you mean --threads?\n")));
+  EXPECT_THAT(runProgram(GetParam().path, joined(arguments, "--thraeds 1")),
+              Fails(2, "--thraeds", "; did you mean --threads?\n"));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -142,17 +122,17 @@ INSTANTIATE_TEST_SUITE_P(
 
 constexpr const char* kDriver = "libcuda.so";
 
-class Start : public test::FolderTest {
+class Start : public FolderTest {
  protected:
   void SetUp() override {
-    test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
-    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+    writeInput(at("in.vdb"), {{.voxels = softBall({})}});
+    succeeded(quickFit(at("in.vdb"), at("in.esvr")));
   }
 
   /// What the dynamic linker says about a run.
-  static std::string librariesOf(const char* program, const std::vector<std::string>& arguments) {
+  static std::string librariesOf(const char* program, const Words& arguments) {
     ::setenv("LD_DEBUG", "files", 1);
-    const auto run = test::runProgram(program, arguments);
+    const auto run = runProgram(program, arguments);
     ::unsetenv("LD_DEBUG");
     EXPECT_THAT(run.err, HasSubstr("libstdc++")) << "the linker says nothing";
     return run.err;
@@ -170,7 +150,7 @@ TEST_F(Start, doesNotLookForADriverWithoutADevice) {
 
 TEST_F(Start, doesNotLookForADriverForHelp) {
   for (const char* program : {VDB2ESVR, ESVR2VDB, ESVR_RENDER, ESVR_VIEW, ESVR_COMPARE})
-    EXPECT_THAT(librariesOf(program, {"--help"}), Not(HasSubstr(kDriver))) << program;
+    EXPECT_THAT(librariesOf(program, "--help"), Not(HasSubstr(kDriver))) << program;
 }
 
 TEST_F(Start, looksForADriverOnlyIfTheBuildHasCuda) {
@@ -180,4 +160,4 @@ TEST_F(Start, looksForADriverOnlyIfTheBuildHasCuda) {
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -3,31 +3,16 @@
 // level sets, in .vdb and .nvdb files, in twins and in sequences. Reports and lists count them, comparisons leave them
 // out, and pictures show them as empty.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <fstream>
-#include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
-#include "cli/converters.h"
-#include "esvr/grid_coding.h"
-#include "esvr/metrics.h"
+#include "cli/conversion.h"
 #include "support/non_finite.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using test::InputGrid;
-using test::InputVoxel;
-using test::kInf;
-using test::kNan;
-using test::softBall;
-using testing::AllOf;
 using testing::HasSubstr;
-using testing::Not;
 
 /// A ball with voxels that are not finite in it and beside it.
 InputGrid damagedBall(const std::string& name = "density") {
@@ -41,19 +26,12 @@ InputGrid damagedBall(const std::string& name = "density") {
 
 const ReadOptions kKeep{.nonFinite = NonFinite::kKeep};
 
-class NonFiniteFile : public test::Vdb2Esvr {
+class NonFiniteFile : public Vdb2Esvr {
  protected:
-  [[nodiscard]] std::string back() const { return folder_ / "back.vdb"; }
-
-  void convert(std::vector<std::string> options) const {
-    options.insert(options.begin(), {in(), out(), "--force", "--nonfinite", "keep"});
-    const auto run = test::vdb2esvr(options);
-    ASSERT_EQ(run.exitCode, 0) << run.err;
+  void convertKept(const Words& options) const {
+    succeeded(convert(joined("--nonfinite keep", options)));
   }
-  void decode(const std::string& to) const {
-    const auto run = test::esvr2vdb({out(), to, "--force"});
-    ASSERT_EQ(run.exitCode, 0) << run.err;
-  }
+  void decode(const std::string& to) const { succeeded(esvr2vdb({out(), to, "--force"})); }
 };
 
 /// Counts the voxels that are not finite in the first volume. The test fails if the second has others.
@@ -64,10 +42,8 @@ std::uint64_t expectSame(const SparseVolume& a, const SparseVolume& b) {
 }
 
 TEST_F(NonFiniteFile, isRefusedWithTheOptionThatKeepsIt) {
-  test::writeInput(in(), {damagedBall()});
-  const auto run = fitQuickly();
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, HasSubstr("--nonfinite keep stores where they are"));
+  writeInput(in(), {damagedBall()});
+  EXPECT_THAT(fitQuickly(), Fails(3, "--nonfinite keep stores where they are"));
   EXPECT_FALSE(outIsThere());
 }
 
@@ -75,16 +51,15 @@ TEST_F(NonFiniteFile, comesBackInEveryFormAndOutput) {
   for (const bool isHalf : {false, true}) {
     InputGrid grid = damagedBall();
     grid.half = isHalf;
-    test::writeInput(in(), {grid});
+    writeInput(in(), {grid});
     const SparseVolume source = readGrid(in(), 0, kKeep).volume;
-    for (const std::vector<std::string>& goal :
-         {std::vector<std::string>{"--count", "30", "--iterations", "40"},
-          {"--psnr", "40", "--representation", "voxels"},
-          {"--max-error", "0.01"},
-          {"--max-relative-error", "1%"},
-          {"--lossless"},
-          {}}) {
-      convert(goal);
+    for (const Words& goal : {Words{"--count", "30", "--iterations", "40"},
+                              {"--psnr", "40", "--representation", "voxels"},
+                              {"--max-error", "0.01"},
+                              {"--max-relative-error", "1%"},
+                              {"--lossless"},
+                              {}}) {
+      convertKept(goal);
       for (const char* name : {"back.vdb", "back.nvdb"}) {
         decode(folder_ / name);
         const VolumeGrid made = readGrid(folder_ / name, 0, kKeep);
@@ -96,32 +71,30 @@ TEST_F(NonFiniteFile, comesBackInEveryFormAndOutput) {
 }
 
 TEST_F(NonFiniteFile, isCountedByTheReportAndTheList) {
-  test::writeInput(in(), {damagedBall()});
+  writeInput(in(), {damagedBall()});
   const std::string report = folder_ / "report.json";
-  convert({"--max-error", "0.01", "--report", report});
+  convertKept({"--max-error", "0.01", "--report", report});
   std::ifstream stream(report);
-  const auto kept = nlohmann::json::parse(stream)["grids"][0]["source"]["nonfinite_kept"];
+  const auto kept = Json::parse(stream)["grids"][0]["source"]["nonfinite_kept"];
   EXPECT_GT(kept["nan"], 20);
   EXPECT_EQ(kept["plus_infinity"], 1);
   EXPECT_EQ(kept["minus_infinity"], 1);
   EXPECT_GT(kept["bytes"], 20);
-  const auto list = test::esvr2vdb({"--list", out(), "-v"});
-  EXPECT_THAT(list.out, AllOf(HasSubstr("not finite"), HasSubstr("non-finite voxels"),
-                              HasSubstr("NaN and 1 +infinity and 1 -infinity voxels")));
+  EXPECT_THAT(
+      esvr2vdb({"--list", out(), "-v"}).out,
+      Says("not finite", "non-finite voxels", "NaN and 1 +infinity and 1 -infinity voxels"));
 }
 
 TEST_F(NonFiniteFile, isComparedWithoutThem) {
-  test::writeInput(in(), {damagedBall()});
-  convert({"--max-error", "0.01"});
-  const auto run = test::esvr2vdb({out(), back(), "--reference", in()});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_EQ(test::runProgram(ESVR_COMPARE, {"check", in(), out(), "--max-error", "0.01"}).exitCode,
-            0);
+  writeInput(in(), {damagedBall()});
+  convertKept("--max-error 0.01");
+  succeeded(esvr2vdb({out(), back(), "--reference", in()}));
+  succeeded(compare("check", {in(), out(), "--max-error", "0.01"}));
   InputGrid other = damagedBall();
   other.voxels.back().value = 0.5f;
   const std::string changed = folder_ / "changed.vdb";
-  test::writeInput(changed, {other});
-  const auto check = test::runProgram(ESVR_COMPARE, {"check", in(), changed});
+  writeInput(changed, {other});
+  const auto check = compare("check", {in(), changed});
   EXPECT_NE(check.exitCode, 0);
   EXPECT_THAT(check.out + check.err,
               HasSubstr("(41, 0, 0) is not finite: it is minus infinity in the reference"));
@@ -129,13 +102,13 @@ TEST_F(NonFiniteFile, isComparedWithoutThem) {
 
 TEST_F(NonFiniteFile, keepsComponentsOfVectors) {
   // An infinity times the scales 1, -0.5 and 0 makes an infinity, a minus infinity and NaN.
-  test::InputVectors vectors{.voxels = softBall({})};
+  InputVectors vectors{.voxels = softBall({})};
   vectors.voxels[7].value = kInf;
-  test::writeVectorInput(in(), vectors);
+  writeVectorInput(in(), vectors);
   for (const bool asDouble : {false, true}) {
     vectors.asDouble = asDouble;
-    test::writeVectorInput(in(), vectors);
-    convert({"--max-error", "0.01", "--representation", "voxels"});
+    writeVectorInput(in(), vectors);
+    convertKept("--max-error 0.01 --representation voxels");
     decode(back());
     const VectorVolume a = readVector(in(), 0, kKeep).components,
                        b = readVector(back(), 0, kKeep).components;
@@ -150,8 +123,8 @@ TEST_F(NonFiniteFile, keepsComponentsOfVectors) {
 }
 
 TEST_F(NonFiniteFile, isSharedByTwins) {
-  test::writeInput(in(), {damagedBall(), damagedBall("copy")});
-  convert({"--max-error", "0.01"});
+  writeInput(in(), {damagedBall(), damagedBall("copy")});
+  convertKept("--max-error 0.01");
   const EsvrFile file = readEsvr(out());
   ASSERT_EQ(file.grids.size(), 2u);
   EXPECT_EQ(file.grids[0].nonFiniteVoxels, file.grids[1].nonFiniteVoxels);
@@ -164,9 +137,9 @@ TEST_F(NonFiniteFile, isSharedByTwins) {
 
 TEST_F(NonFiniteFile, ofALevelSetKeepsItsSides) {
   InputGrid band{.background = 3.0f, .levelSet = true};
-  for (const InputVoxel& voxel : test::distances(11))
+  for (const InputVoxel& voxel : distances(11))
     if (std::abs(voxel.value) < 3.0f) band.voxels.push_back(voxel);
-  test::writeInput(in(), {band});
+  writeInput(in(), {band});
   const std::string filled =
       folder_ / "filled.vdb";  // its inactive voxels have the signs of their sides
   writeGrids(filled, {}, std::vector<VolumeGrid>{readGrid(in(), 0)});
@@ -177,10 +150,9 @@ TEST_F(NonFiniteFile, ofALevelSetKeepsItsSides) {
     if (value < -2.0f && value > -3.0f) value = kNan;  // the voxels next to the inside
   std::filesystem::remove(in());
   writeGrids(in(), {}, std::vector<VolumeGrid>{source});
-  for (const std::vector<std::string>& goal :
-       {std::vector<std::string>{"--lossless"},
-        {"--representation", "ellipsoids", "--psnr", "35"}}) {
-    convert(goal);
+  for (const Words& goal :
+       {Words{"--lossless"}, {"--representation", "ellipsoids", "--psnr", "35"}}) {
+    convertKept(goal);
     decode(back());
     const SparseVolume made = readGrid(back(), 0, kKeep).volume;
     // They have no sign. All others have that of the band without them.
@@ -192,12 +164,11 @@ TEST_F(NonFiniteFile, ofASequenceComesBackInEachFrame) {
   for (int frame = 1; frame <= 3; ++frame) {
     InputGrid grid = damagedBall();
     for (InputVoxel& voxel : grid.voxels) voxel.value *= 1.0f - 0.1f * float(frame);
-    test::writeInput(folder_ / ("in.000" + std::to_string(frame) + ".vdb"), {grid});
+    writeInput(folder_ / ("in.000" + std::to_string(frame) + ".vdb"), {grid});
   }
-  const auto run = test::vdb2esvr(
-      {folder_ / "in.####.vdb", out(), "--nonfinite", "keep", "--max-error", "0.01"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  ASSERT_EQ(test::esvr2vdb({out(), folder_ / "back.####.vdb"}).exitCode, 0);
+  succeeded(
+      vdb2esvr({folder_ / "in.####.vdb", out(), "--nonfinite", "keep", "--max-error", "0.01"}));
+  succeeded(esvr2vdb({out(), folder_ / "back.####.vdb"}));
   for (const char* frame : {".0001.vdb", ".0002.vdb", ".0003.vdb"}) {
     const VolumeMetrics m =
         compareVolumes(readGrid(folder_ / ("in" + std::string(frame)), 0, kKeep).volume,
@@ -212,22 +183,21 @@ TEST_F(NonFiniteFile, isDrawnAsIfTheyWereEmpty) {
   std::erase_if(empty.voxels, [](const InputVoxel& voxel) { return !std::isfinite(voxel.value); });
   const auto picture = [&](const std::string& from, const std::string& name) {
     const std::string to = folder_ / name;
-    const auto run =
-        test::runProgram(ESVR_RENDER, {from, to, "--resolution", "32x32", "--device", "cpu",
-                                       "--eye", "40,30,20", "--center", "0,0,0", "--range", "0,1"});
-    EXPECT_EQ(run.exitCode, 0) << run.err;
+    succeeded(
+        runProgram(ESVR_RENDER, {from, to, "--resolution", "32x32", "--device", "cpu", "--eye",
+                                 "40,30,20", "--center", "0,0,0", "--range", "0,1"}));
     std::ifstream stream(to, std::ios::binary);
     const std::string bytes(std::istreambuf_iterator<char>(stream), {});
     return bytes.substr(bytes.find("IDAT"));  // the text before it has the command line
   };
-  test::writeInput(in(), {damagedBall()});
-  convert({"--lossless"});
+  writeInput(in(), {damagedBall()});
+  convertKept("--lossless");
   const std::string ofEsvr = picture(out(), "esvr.png"), ofVdb = picture(in(), "vdb.png");
-  test::writeInput(in(), {empty});
+  writeInput(in(), {empty});
   const std::string ofEmpty = picture(in(), "empty.png");
   EXPECT_TRUE(ofVdb == ofEmpty);
   EXPECT_TRUE(ofEsvr == ofEmpty);
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -3,58 +3,37 @@
 // Sequences of .esvr files are converted back. The frames must have the voxels of single conversions.
 // Frames that are missing or damaged are treated as the options say.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
-#include <nlohmann/json.hpp>
 
-#include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
-#include "esvr/container.h"
-#include "esvr/grid_coding.h"
-#include "esvr/metrics.h"
+#include "cli/conversion.h"
 #include "esvr/sequence_file.h"
-#include "esvr/vdb_io.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using test::esvr2vdb;
-using test::readText;
-using test::runInterrupted;
-using test::vdb2esvr;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-using Words = std::vector<std::string>;
-
 constexpr int kGroup = 16;  ///< frames of a group
 
-class OneFile : public test::FolderTest {
+class OneFile : public FolderTest {
  protected:
-  void writeFrame(int number, const std::vector<test::InputGrid>& grids) const {
-    test::writeInput(at("in." + std::to_string(number) + ".vdb"), grids);
+  void writeFrame(int number, const std::vector<InputGrid>& grids) const {
+    writeInput(at("in." + std::to_string(number) + ".vdb"), grids);
   }
   /// Balls of different values as the frames first to last.
   void writeFrames(int first, int last) const {
     for (int frame = first; frame <= last; ++frame)
-      writeFrame(frame, {{.voxels = test::softBall({frame, 0, 0}, float(20 + frame))}});
+      writeFrame(frame, {{.voxels = softBall({frame, 0, 0}, float(20 + frame))}});
   }
   [[nodiscard]] Words wordsFor(const std::string& output, const Words& more) const {
-    Words words{at("in.@.vdb"), at(output), "--lossless", "--device", "cpu"};
-    words.insert(words.end(), more.begin(), more.end());
-    return words;
+    return joined({at("in.@.vdb"), at(output), "--lossless", "--device", "cpu"}, more);
   }
-  [[nodiscard]] test::ProgramRun convert(const Words& more = {},
-                                         const std::string& output = "out.esvr") const {
+  [[nodiscard]] ProgramRun convert(const Words& more = {},
+                                   const std::string& output = "out.esvr") const {
     return vdb2esvr(wordsFor(output, more));
   }
   [[nodiscard]] std::string bytesOf(const std::string& name) const { return readText(at(name)); }
@@ -77,16 +56,15 @@ class OneFile : public test::FolderTest {
   void damage(const std::string& name, std::uint64_t byte) const {
     std::string bytes = bytesOf(name);
     bytes[byte] = char(bytes[byte] ^ 1);
-    test::writeText(at(name), bytes);
+    writeText(at(name), bytes);
   }
 };
 
 TEST_F(OneFile, hasTheFramesByTheirNumbers) {
   constexpr int kFrames = 2 * kGroup + 2;
   writeFrames(-3, kFrames - 4);
-  const auto run = convert({"--report", at("r.json")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("out.esvr: 3 groups of at most 16 frames"));
+  EXPECT_THAT(succeeded(convert({"--report", at("r.json")})).out,
+              HasSubstr("out.esvr: 3 groups of at most 16 frames"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr", "r.json"));
   const auto numbers = numbersIn("out.esvr");
   const auto groups = groupsIn("out.esvr");
@@ -106,15 +84,14 @@ TEST_F(OneFile, hasTheFramesByTheirNumbers) {
 
 TEST_F(OneFile, repeatsTheGridsOfFramesThatAreEqual) {
   const auto write = [&](int frame, float value) {
-    writeFrame(frame, {{.voxels = test::cloud(12)},
-                       {.name = "heat", .voxels = test::softBall({0, 0, 0}, value)}});
+    writeFrame(frame,
+               {{.voxels = cloud(12)}, {.name = "heat", .voxels = softBall({0, 0, 0}, value)}});
   };
   write(1, 20.0f), write(2, 20.0f), write(3, 30.0f);
   for (const Words& goal : std::vector<Words>{{"--size", "3000"}, {"--psnr", "40"}, {}}) {
-    Words words{at("in.@.vdb"), at("out.esvr"), "--device", "cpu", "-f", "--report", at("r.json")};
-    words.insert(words.end(), goal.begin(), goal.end());
-    const auto run = vdb2esvr(words);
-    ASSERT_EQ(run.exitCode, 0) << run.err;
+    succeeded(vdb2esvr(
+        joined({at("in.@.vdb"), at("out.esvr"), "--device", "cpu", "-f", "--report", at("r.json")},
+               goal)));
     SequenceReader reader(at("out.esvr"));
     const auto voxels = [&](std::int64_t frame, std::size_t grid) {
       return decodeGrid(reader.read(frame).grids.at(grid)).values;
@@ -137,19 +114,18 @@ TEST_F(OneFile, repeatsTheGridsOfFramesThatAreEqual) {
 
 TEST_F(OneFile, hasTheSameBytesOnAnyNumberOfThreads) {
   writeFrames(1, 2 * kGroup + 1);
-  ASSERT_EQ(convert({"--threads", "1"}).exitCode, 0);
-  ASSERT_EQ(convert({"--threads", "4"}, "four.esvr").exitCode, 0);
+  succeeded(convert("--threads 1"));
+  succeeded(convert("--threads 4", "four.esvr"));
   EXPECT_TRUE(bytesOf("four.esvr") == bytesOf("out.esvr"));
-  ASSERT_EQ(convert({"--frames", "33-1"}, "down.esvr").exitCode, 0);
+  succeeded(convert("--frames 33-1", "down.esvr"));
   EXPECT_TRUE(bytesOf("down.esvr") == bytesOf("out.esvr")) << "frames are sorted";
 }
 
 TEST_F(OneFile, beginsAGroupWhereGridsDiffer) {
   writeFrames(1, 5);
-  writeFrame(3, {{.voxels = test::softBall({}), .map = test::InputMap::kRotated}});
-  writeFrame(5, {{.voxels = test::softBall({})}, {.name = "heat", .voxels = test::softBall({})}});
-  const auto run = convert();
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  writeFrame(3, {{.voxels = softBall({}), .map = InputMap::kRotated}});
+  writeFrame(5, {{.voxels = softBall({})}, {.name = "heat", .voxels = softBall({})}});
+  const auto run = succeeded(convert());
   EXPECT_THAT(groupsIn("out.esvr"), ElementsAre(0, 0, 1, 2, 3));
   EXPECT_THAT(run.out, HasSubstr("frames 3-5 each begin a group, because their grids differ"));
 }
@@ -157,9 +133,9 @@ TEST_F(OneFile, beginsAGroupWhereGridsDiffer) {
 TEST_F(OneFile, hasAnEmptyFrameInTheMiddle) {
   writeFrames(1, 3);
   writeFrame(2, {{}});
-  ASSERT_EQ(convert().exitCode, 0);
+  succeeded(convert());
   EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 3));
-  ASSERT_EQ(esvr2vdb({at("out.esvr"), at("back.@.vdb")}).exitCode, 0);
+  succeeded(esvr2vdb({at("out.esvr"), at("back.@.vdb")}));
   EXPECT_EQ(inspectVdb(at("back.2.vdb")).grids.at(0).activeVoxels, 0u);
   EXPECT_GT(inspectVdb(at("back.3.vdb")).grids.at(0).activeVoxels, 0u);
 }
@@ -168,13 +144,11 @@ TEST_F(OneFile, hasAnEmptyFrameInTheMiddle) {
 // are its bytes in the sequence, and not those of the same grid in a file of its own.
 TEST_F(OneFile, keepsToTheSizeOfEveryFrame) {
   writeFrame(1, {{}});
-  for (const int frame : {2, 3}) writeFrame(frame, {{.voxels = test::cloud(10)}});
+  for (const int frame : {2, 3}) writeFrame(frame, {{.voxels = cloud(10)}});
   const SparseVolume source = readGrid(at("in.2.vdb"), "density").volume;
   for (const auto& goal : {Words{"--size", "1KB"}, Words{"--ratio", "40"}}) {
-    Words words{at("in.@.vdb"), at("out.esvr"), "--device", "cpu", "--force"};
-    words.insert(words.end(), goal.begin(), goal.end());
-    const auto run = vdb2esvr(words);
-    ASSERT_EQ(run.exitCode, 0) << run.err;
+    succeeded(
+        vdb2esvr(joined({at("in.@.vdb"), at("out.esvr"), "--device", "cpu", "--force"}, goal)));
     SequenceReader reader(at("out.esvr"));
     ASSERT_EQ(reader.frames().size(), 3u);
     const auto most = goal[0] == "--size" ? 1024u : std::uint64_t(sizeOf("in.3.vdb") / 40);
@@ -189,14 +163,13 @@ TEST_F(OneFile, keepsToTheSizeOfEveryFrame) {
 TEST_F(OneFile, holdsOrSkipsMissingFrames) {
   writeFrames(1, 2);
   writeFrames(5, 5);
-  EXPECT_EQ(convert({"--frames", "1-5"}).exitCode, 3);
+  EXPECT_THAT(convert("--frames 1-5"), Fails(3));
   EXPECT_THAT(outputs(), IsEmpty());
-  ASSERT_EQ(convert({"--frames", "1-5", "--missing", "skip"}).exitCode, 0);
+  succeeded(convert("--frames 1-5 --missing skip"));
   EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 2, 5));
   writeFrames(6, 18);  // 16 frames have an input
   writeFrames(20, 20);
-  const auto held = convert({"--frames", "1-20", "--missing", "hold"}, "held.esvr");
-  ASSERT_EQ(held.exitCode, 0) << held.err;
+  const auto held = succeeded(convert("--frames 1-20 --missing hold", "held.esvr"));
   EXPECT_THAT(held.out, HasSubstr("held from 2"));
   const auto groups = groupsIn("held.esvr");
   ASSERT_EQ(groups.size(), 20u);
@@ -208,58 +181,46 @@ TEST_F(OneFile, holdsOrSkipsMissingFrames) {
 
 TEST_F(OneFile, lacksFramesThatAreDamaged) {
   writeFrames(1, 4);
-  test::writeText(at("in.2.vdb"), "no volume");
-  const auto run = convert();
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, HasSubstr("1 of 4 frames failed: 2"));
+  writeText(at("in.2.vdb"), "no volume");
+  EXPECT_THAT(convert(), Fails(3, "1 of 4 frames failed: 2"));
   EXPECT_THAT(numbersIn("out.esvr"), ElementsAre(1, 3, 4));
 }
 
 TEST_F(OneFile, isContinuedAfterItStopped) {
   writeFrames(1, kGroup + 4);
-  ASSERT_EQ(convert({}, "whole.esvr").exitCode, 0);
+  succeeded(convert({}, "whole.esvr"));
   fs::rename(at("in.18.vdb"), at("in.eighteen"));
-  test::writeText(at("in.18.vdb"), "no volume");
-  const auto stopped = convert({"--on-error", "stop", "--threads", "1"});
-  EXPECT_EQ(stopped.exitCode, 3);
+  writeText(at("in.18.vdb"), "no volume");
+  EXPECT_THAT(convert("--on-error stop --threads 1"), Fails(3));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "whole.esvr"));
-  const auto refused = convert();
-  EXPECT_EQ(refused.exitCode, 1);
-  EXPECT_THAT(refused.err, AllOf(HasSubstr("out.esvr.partial"), HasSubstr("--resume")));
-  const auto fewer = convert({"--resume", "--frames", "2-20"});
-  EXPECT_EQ(fewer.exitCode, 2);
-  EXPECT_THAT(fewer.err, HasSubstr("has frame 1"));
+  EXPECT_THAT(convert(), Fails(1, "out.esvr.partial", "--resume"));
+  EXPECT_THAT(convert("--resume --frames 2-20"), Fails(2, "has frame 1"));
   writeFrames(0, 0);
-  const auto other = convert({"--resume"});
-  EXPECT_EQ(other.exitCode, 2);
-  EXPECT_THAT(other.err, HasSubstr("has other groups"));
+  EXPECT_THAT(convert("--resume"), Fails(2, "has other groups"));
 
   fs::remove(at("in.0.vdb"));
   fs::rename(at("in.eighteen"), at("in.18.vdb"));
-  const auto run = convert({"--resume"});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("kept"));
+  EXPECT_THAT(succeeded(convert("--resume")).out, HasSubstr("kept"));
   EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr", "whole.esvr"));
 }
 
 TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
   writeFrames(1, kGroup + 2);
-  ASSERT_EQ(convert({}, "whole.esvr").exitCode, 0);
+  succeeded(convert({}, "whole.esvr"));
   const std::string whole = bytesOf("whole.esvr");
   const SequenceReader reader(at("whole.esvr"));
   const std::uint64_t second = reader.frames()[kGroup].offset;
   for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{30}, second - 1, second + 9}) {
-    test::writeText(at("out.esvr.partial"), "");
+    writeText(at("out.esvr.partial"), "");
     std::string left = whole.substr(0, bytes);
     // The header of a file that is not complete says that the file has no bytes and no sections.
     if (left.size() >= 48) {
       SequenceWriter empty(at("empty.esvr"));
       left.replace(0, 48, bytesOf("empty.esvr.partial"));
     }
-    test::writeText(at("out.esvr.partial"), left);
-    const auto run = convert({"--resume"});
-    ASSERT_EQ(run.exitCode, 0) << run.err;
+    writeText(at("out.esvr.partial"), left);
+    succeeded(convert("--resume"));
     EXPECT_TRUE(bytesOf("out.esvr") == whole) << bytes;
     fs::remove(at("out.esvr"));
   }
@@ -270,14 +231,14 @@ class SlowLastFrame : public OneFile {
  protected:
   SlowLastFrame() {
     writeFrames(1, kGroup);
-    writeFrame(kGroup + 1, {{.voxels = test::cloud(60)}});
+    writeFrame(kGroup + 1, {{.voxels = cloud(60)}});
   }
   void makeQuick() const { writeFrames(kGroup + 1, kGroup + 1); }
   [[nodiscard]] Words wordsTo(const std::string& output) const {
     return {at("in.@.vdb"), at(output), "--device",  "cpu", "--representation", "voxels",
             "--psnr",       "40",       "--threads", "1",   "--progress",       "json"};
   }
-  [[nodiscard]] test::ProgramRun resumed() const {
+  [[nodiscard]] ProgramRun resumed() const {
     Words words = wordsTo("out.esvr");
     words.emplace_back("--resume");
     return vdb2esvr(words);
@@ -290,106 +251,93 @@ TEST_F(SlowLastFrame, isConvertedAfterTheProgramWasKilled) {
   std::string command = std::string(VDB2ESVR);
   for (const std::string& word : wordsTo("out.esvr")) command += " '" + word + "'";
   const std::string log = "'" + at("log") + "'";
-  const auto killed = test::runProgram(
-      "/bin/sh", {"-c", "touch " + log + "; " + command + " 2>" + log + " & until grep -q '" +
-                            kWithoutTheLast + "' " + log +
-                            "; do sleep 0.01; done; sleep 0.2; kill -9 $!; wait $!"});
-  EXPECT_EQ(killed.exitCode, 128 + 9);
+  EXPECT_EQ(runShell("touch " + log + "; " + command + " 2>" + log + " & until grep -q '" +
+                     kWithoutTheLast + "' " + log +
+                     "; do sleep 0.01; done; sleep 0.2; kill -9 $!; wait $!")
+                .exitCode,
+            128 + 9);
   EXPECT_TRUE(fs::exists(at("out.esvr.partial")));
   makeQuick();
-  ASSERT_EQ(vdb2esvr(wordsTo("whole.esvr")).exitCode, 0);
-  const auto run = resumed();
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+  succeeded(vdb2esvr(wordsTo("whole.esvr")));
+  succeeded(resumed());
   EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
 }
 
 TEST_F(SlowLastFrame, leavesTheCompleteGroupsWhereItIsInterrupted) {
-  const auto stopped = runInterrupted(VDB2ESVR, wordsTo("out.esvr"), kWithoutTheLast);
-  EXPECT_EQ(stopped.exitCode, 1);
-  EXPECT_THAT(stopped.err, HasSubstr("interrupted; 16 of 17 frames are complete, and --resume"));
+  EXPECT_THAT(runInterrupted(VDB2ESVR, wordsTo("out.esvr"), kWithoutTheLast),
+              Fails(1, "interrupted; 16 of 17 frames are complete, and --resume"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial"));
   makeQuick();
-  const auto run = resumed();
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.err, HasSubstr("\"kept\""));
+  EXPECT_THAT(succeeded(resumed()).err, HasSubstr("\"kept\""));
   EXPECT_EQ(numbersIn("out.esvr").size(), std::size_t(kGroup + 1));
 }
 
 TEST_F(OneFile, isReplacedWhereForcedOnly) {
   writeFrames(1, 2);
-  test::writeText(at("out.esvr"), "mine");
-  const auto refused = convert();
-  EXPECT_EQ(refused.exitCode, 1);
-  EXPECT_THAT(refused.err, HasSubstr("exists already"));
+  writeText(at("out.esvr"), "mine");
+  EXPECT_THAT(convert(), Fails(1, "exists already"));
   EXPECT_EQ(bytesOf("out.esvr"), "mine");
-  test::writeText(at("out.esvr.partial"), "a file of somebody else");
-  EXPECT_THAT(convert({"--force"}).err, HasSubstr("is no part of an .esvr file"));
+  writeText(at("out.esvr.partial"), "a file of somebody else");
+  EXPECT_THAT(convert("--force").err, HasSubstr("is no part of an .esvr file"));
   EXPECT_EQ(bytesOf("out.esvr.partial"), "a file of somebody else");
   EXPECT_EQ(bytesOf("out.esvr"), "mine");
   fs::remove(at("out.esvr.partial"));
-  EXPECT_EQ(convert({"--force"}).exitCode, 0);
+  succeeded(convert("--force"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr"));
 }
 
 TEST_F(OneFile, comesBackByFrames) {
   writeFrames(1, 6);
-  ASSERT_EQ(convert().exitCode, 0);
-  const auto run = esvr2vdb(
-      {at("out.esvr"), at("back.##.vdb"), "--frames", "5,2", "--reference", at("in.@.vdb")});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("frame 5:"), HasSubstr("frame 2:")));
+  succeeded(convert());
+  EXPECT_THAT(succeeded(esvr2vdb({at("out.esvr"), at("back.##.vdb"), "--frames", "5,2",
+                                  "--reference", at("in.@.vdb")}))
+                  .out,
+              Says("frame 5:", "frame 2:"));
   EXPECT_THAT(outputs(), ElementsAre("back.02.vdb", "back.05.vdb", "out.esvr"));
   for (const std::string frame : {"2", "5"})
     EXPECT_EQ(readGrid(at("back.0" + frame + ".vdb"), "density").volume.values,
               readGrid(at("in." + frame + ".vdb"), "density").volume.values);
-  const auto missing = esvr2vdb({at("out.esvr"), at("x.@.vdb"), "--frames", "5-7"});
-  EXPECT_EQ(missing.exitCode, 3);
-  EXPECT_THAT(missing.err, HasSubstr("frame 7 is missing"));
-  const auto onePath = esvr2vdb({at("out.esvr"), at("x.vdb")});
-  EXPECT_EQ(onePath.exitCode, 2);
-  EXPECT_THAT(onePath.err, HasSubstr("x.####.vdb"));
+  EXPECT_THAT(esvr2vdb({at("out.esvr"), at("x.@.vdb"), "--frames", "5-7"}),
+              Fails(3, "frame 7 is missing"));
+  EXPECT_THAT(esvr2vdb({at("out.esvr"), at("x.vdb")}), Fails(2, "x.####.vdb"));
 }
 
 TEST_F(OneFile, isListedByFrames) {
   writeFrames(1, 3);
-  writeFrame(3, {{.voxels = test::softBall({}), .map = test::InputMap::kRotated}});
-  ASSERT_EQ(convert().exitCode, 0);
-  const auto run = esvr2vdb({"--list", at("out.esvr")});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("format 1.3"), HasSubstr("3 frames in 2 groups"),
-                             HasSubstr(std::to_string(sizeOf("out.esvr")) + " bytes")));
+  writeFrame(3, {{.voxels = softBall({}), .map = InputMap::kRotated}});
+  succeeded(convert());
+  EXPECT_THAT(
+      succeeded(esvr2vdb({"--list", at("out.esvr")})).out,
+      Says("format 1.3", "3 frames in 2 groups", std::to_string(sizeOf("out.esvr")) + " bytes"));
 }
 
 TEST_F(OneFile, isCheckedFrameByFrame) {
   writeFrames(1, 4);
-  ASSERT_EQ(convert().exitCode, 0);
+  succeeded(convert());
   EXPECT_THAT(esvr2vdb({"--check", at("out.esvr")}).out, HasSubstr("out.esvr: OK"));
   damage("out.esvr", SequenceReader(at("out.esvr")).frames()[3].offset + 60);
-  const auto run = esvr2vdb({"--check", at("out.esvr")});
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("1 of 4 frames are lost: 4"), HasSubstr("frame 4: ")));
+  EXPECT_THAT(esvr2vdb({"--check", at("out.esvr")}),
+              Fails(3, "1 of 4 frames are lost: 4", "frame 4: "));
   const auto back = esvr2vdb({at("out.esvr"), at("back.@.vdb")});
-  EXPECT_EQ(back.exitCode, 3);
-  EXPECT_THAT(back.err, HasSubstr("1 of 4 frames failed: 4"));
+  EXPECT_THAT(back, Fails(3, "1 of 4 frames failed: 4"));
   EXPECT_THAT(outputs(), ElementsAre("back.1.vdb", "back.2.vdb", "back.3.vdb", "out.esvr"));
 }
 
 TEST_F(OneFile, isDrawnFrameByFrame) {
   writeFrames(-1, 2);
   writeFrame(1, {{}});
-  ASSERT_EQ(convert().exitCode, 0);
-  const auto draw = [&](const std::string& output, Words more) {
-    more.insert(more.begin(),
-                {at("out.esvr"), at(output), "--resolution", "16x16", "--device", "cpu"});
-    return test::runProgram(ESVR_RENDER, more);
+  succeeded(convert());
+  const auto draw = [&](const std::string& output, const Words& more) {
+    return runProgram(
+        ESVR_RENDER,
+        joined({at("out.esvr"), at(output), "--resolution", "16x16", "--device", "cpu"}, more));
   };
-  const auto run = draw("p.##.png", {"--frames", "-1-2x1"});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+  succeeded(draw("p.##.png", "--frames -1-2x1"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr", "p.-1.png", "p.00.png", "p.01.png", "p.02.png"));
   EXPECT_FALSE(bytesOf("p.00.png") == bytesOf("p.02.png")) << "one range of values for all";
   EXPECT_THAT(draw("p.png", {}).err, HasSubstr("needs a pattern"));
-  EXPECT_THAT(draw("q.##.png", {"--frames", "7"}).err, HasSubstr("there is no frame 7"));
-  EXPECT_THAT(draw("q.##.png", {"--turntable", "3"}).err,
+  EXPECT_THAT(draw("q.##.png", "--frames 7").err, HasSubstr("there is no frame 7"));
+  EXPECT_THAT(draw("q.##.png", "--turntable 3").err,
               HasSubstr("--turntable cannot be combined with a sequence"));
 }
 
@@ -398,24 +346,23 @@ class MovingCloud : public OneFile {
  protected:
   MovingCloud() {
     for (int frame = 1; frame <= 6; ++frame) {
-      auto voxels = test::cloud(14);
-      for (test::InputVoxel& v : voxels)
+      auto voxels = cloud(14);
+      for (InputVoxel& v : voxels)
         v.value *= 1.0f + 0.3f * std::sin(0.9f * (float(v.at.x) - float(frame) / 3.0f)) *
                               std::cos(0.7f * float(v.at.y + v.at.z));
       writeFrame(frame, {{.voxels = voxels}});
     }
   }
-  [[nodiscard]] test::ProgramRun convertTo(const std::string& output, const Words& more) const {
-    Words words{at("in.@.vdb"), at(output), "--device",         "cpu",
-                "--psnr",       "40",       "--representation", "voxels"};
-    words.insert(words.end(), more.begin(), more.end());
-    return vdb2esvr(words);
+  [[nodiscard]] ProgramRun convertTo(const std::string& output, const Words& more) const {
+    return vdb2esvr(joined({at("in.@.vdb"), at(output), "--device", "cpu", "--psnr", "40",
+                            "--representation", "voxels"},
+                           more));
   }
 };
 
 TEST_F(MovingCloud, takesFewerBytesThanFramesOfTheirOwn) {
-  ASSERT_EQ(convertTo("alone.@.esvr", {}).exitCode, 0);
-  ASSERT_EQ(convertTo("out.esvr", {"--report", at("r.json")}).exitCode, 0);
+  succeeded(convertTo("alone.@.esvr", {}));
+  succeeded(convertTo("out.esvr", {"--report", at("r.json")}));
   double alone = 0.0;
   for (int frame = 1; frame <= 6; ++frame)
     alone += double(sizeOf("alone." + std::to_string(frame) + ".esvr"));
@@ -427,21 +374,17 @@ TEST_F(MovingCloud, takesFewerBytesThanFramesOfTheirOwn) {
     EXPECT_GE(frame["grids"][0]["psnr_box"].get<double>(), 40.0);
 }
 
-using Words = std::vector<std::string>;
-
 /// Three frames as in.1.vdb and in.1.esvr, ...
-class SequenceBack : public test::FolderTest {
+class SequenceBack : public FolderTest {
  protected:
   void SetUp() override {
     for (const std::string frame : {"1", "2", "3"})
-      test::writeInput(at("in." + frame + ".vdb"),
-                       {{.voxels = test::softBall({}, std::stof(frame))}});
-    ASSERT_EQ(test::quickFit(at("in.@.vdb"), at("in.@.esvr")).exitCode, 0);
+      writeInput(at("in." + frame + ".vdb"), {{.voxels = softBall({}, std::stof(frame))}});
+    succeeded(quickFit(at("in.@.vdb"), at("in.@.esvr")));
   }
-  [[nodiscard]] test::ProgramRun back(Words more = {},
-                                      const std::string& output = "out.%02d.vdb") const {
-    more.insert(more.begin(), {at("in.@.esvr"), at(output)});
-    return esvr2vdb(more);
+  [[nodiscard]] ProgramRun back(const Words& more = {},
+                                const std::string& output = "out.%02d.vdb") const {
+    return esvr2vdb(joined({at("in.@.esvr"), at(output)}, more));
   }
   [[nodiscard]] Words outputs() const {
     Words names = folder_.names();
@@ -454,39 +397,34 @@ class SequenceBack : public test::FolderTest {
 };
 
 TEST_F(SequenceBack, hasTheVoxelsOfSingleFiles) {
-  const auto run = back({"--frames", "1-3x2"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  succeeded(back("--frames 1-3x2"));
   EXPECT_THAT(outputs(), ElementsAre("out.01.vdb", "out.03.vdb"));
-  ASSERT_EQ(esvr2vdb({at("in.3.esvr"), at("one.vdb")}).exitCode, 0);
+  succeeded(esvr2vdb({at("in.3.esvr"), at("one.vdb")}));
   EXPECT_EQ(voxelsOf("out.03.vdb").values, voxelsOf("one.vdb").values);
   EXPECT_NE(voxelsOf("out.01.vdb").values, voxelsOf("one.vdb").values);
 }
 
 TEST_F(SequenceBack, isComparedWithASequence) {
-  const auto run = back({"--reference", at("in.@.vdb"), "--threads", "3"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(back({"--reference", at("in.@.vdb"), "--threads", "3"}));
   const std::size_t one = run.out.find("frame 1:"), three = run.out.find("frame 3:");
   EXPECT_LT(one, three) << "in their order";
   EXPECT_NE(three, std::string::npos);
-  EXPECT_EQ(back({"--reference", at("in.1.vdb"), "-f"}).exitCode, 2) << "no pattern";
+  EXPECT_THAT(back({"--reference", at("in.1.vdb"), "-f"}), Fails(2)) << "no pattern";
 }
 
 TEST_F(SequenceBack, holdsOrSkipsMissingFrames) {
-  EXPECT_EQ(back({"--frames", "2-4"}).exitCode, 3);
-  ASSERT_EQ(back({"--frames", "2-4", "--missing", "skip"}).exitCode, 0);
+  EXPECT_THAT(back("--frames 2-4"), Fails(3));
+  succeeded(back("--frames 2-4 --missing skip"));
   EXPECT_THAT(outputs(), ElementsAre("out.02.vdb", "out.03.vdb"));
-  ASSERT_EQ(back({"--frames", "2-4", "--missing", "hold"}, "held.##.vdb").exitCode, 0);
+  succeeded(back("--frames 2-4 --missing hold", "held.##.vdb"));
   EXPECT_EQ(voxelsOf("held.04.vdb").values, voxelsOf("out.03.vdb").values);
 }
 
 TEST_F(SequenceBack, namesDamagedFramesAndStopsWhereAsked) {
-  test::writeText(at("in.2.esvr"), "no file of ellipsoids");
-  const auto stopped = back({"--on-error", "stop", "--threads", "1"}, "stop.##.vdb");
-  EXPECT_EQ(stopped.exitCode, 3);
+  writeText(at("in.2.esvr"), "no file of ellipsoids");
+  EXPECT_THAT(back("--on-error stop --threads 1", "stop.##.vdb"), Fails(3));
   EXPECT_THAT(outputs(), ElementsAre("stop.01.vdb"));
-  const auto run = back();
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("frame 2: "), HasSubstr("1 of 3 frames failed: 2")));
+  EXPECT_THAT(back(), Fails(3, "frame 2: ", "1 of 3 frames failed: 2"));
   EXPECT_THAT(outputs(), ElementsAre("out.01.vdb", "out.03.vdb", "stop.01.vdb"));
 }
 
@@ -501,13 +439,13 @@ TEST_F(SequenceBack, isDecodedOneByOneWhereMemoryIsShort) {
 }
 
 TEST_F(SequenceBack, refusesWhatASequenceCannotHave) {
-  EXPECT_EQ(back({}, "out.vdb").exitCode, 2);
-  EXPECT_EQ(esvr2vdb({"--list", at("in.1.esvr"), "--frames", "1"}).exitCode, 2);
-  EXPECT_EQ(esvr2vdb({at("in.1.esvr"), at("out.vdb"), "--frames", "1"}).exitCode, 2);
-  test::writeText(at("out.02.vdb"), "mine");
+  EXPECT_THAT(back({}, "out.vdb"), Fails(2));
+  EXPECT_THAT(esvr2vdb({"--list", at("in.1.esvr"), "--frames", "1"}), Fails(2));
+  EXPECT_THAT(esvr2vdb({at("in.1.esvr"), at("out.vdb"), "--frames", "1"}), Fails(2));
+  writeText(at("out.02.vdb"), "mine");
   EXPECT_THAT(back().err, HasSubstr("it exists already"));
-  EXPECT_EQ(back({"--force"}).exitCode, 0);
+  succeeded(back("--force"));
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

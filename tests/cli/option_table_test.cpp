@@ -2,17 +2,13 @@
 // The test here reads --help and --help expert. It fails if an option is missing from the table or
 // from both of them, or if the named test does not exist or does not use the option.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <filesystem>
 #include <map>
 #include <regex>
 #include <set>
 
 #include "cli/run_program.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 using Table = std::map<std::string, std::string>;  // "Suite.test" by option
@@ -263,10 +259,10 @@ std::vector<Program> programs() {
 std::map<std::string, std::string> optionsOf(const Program& program) {
   std::string help;
   for (const char* topic : {"--help", "expert"}) {
-    std::vector<std::string> arguments{"--help"};
+    Words arguments{"--help"};
     if (*program.job) arguments.insert(arguments.begin(), program.job);
     if (topic != arguments.back()) arguments.emplace_back(topic);
-    help += test::runProgram(program.path, arguments).out;
+    help += runProgram(program.path, arguments).out;
   }
   static const std::regex kOption(R"(\n  (?:(-\w) \[ )?(--[\w-]+))");
   std::map<std::string, std::string> options;
@@ -275,15 +271,15 @@ std::map<std::string, std::string> optionsOf(const Program& program) {
   return options;
 }
 
-const std::vector<std::string>& testSources() {
-  static const std::vector<std::string> kSources = [] {
-    std::vector<std::string> sources;
+const Words& testSources() {
+  static const Words kSources = [] {
+    Words sources;
     for (const char* folder : {"/tests/cli", "/tests/programs", "/tests/samples"})
       for (const auto& file :
            std::filesystem::directory_iterator(ESVR_SOURCE_DIR + std::string(folder)))
         if (file.path().string().ends_with("_test.cpp") &&
             file.path().filename() != "option_table_test.cpp")
-          sources.push_back(test::readText(file.path()));
+          sources.push_back(readText(file.path()));
     return sources;
   }();
   return kSources;
@@ -337,4 +333,4 @@ INSTANTIATE_TEST_SUITE_P(Programs, OptionTable, testing::ValuesIn(programs()),
                          [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

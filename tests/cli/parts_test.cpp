@@ -1,63 +1,41 @@
-// Plan: a fit in chunks gives the same bytes in one run and in a run that was interrupted or
-// killed and continued. A folder of another run, of damaged parts, or of a running process is
-// refused. A volume is converted, written back and compared by processes whose memory is limited
-// to less than its voxels take. `ulimit -d` limits the heap and all private memory of a process, but
-// not the files that it maps. The programs are run with so little memory that the voxels are in
-// files. The tests check that the results are the same, and that a folder which cannot hold the
-// files is refused by name.
+// Plan: a fit in chunks gives the same bytes in one run and in a run that was interrupted or killed and
+// continued. Results are the same where voxels are in files: `ulimit -d` limits the heap and all
+// private memory of a process, but not the files that it maps.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <filesystem>
 #include <iterator>
-#include <nlohmann/json.hpp>
-#include <sstream>
-#include <string>
-#include <vector>
 
-#include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
-#include "esvr/vdb_io.h"
+#include "cli/conversion.h"
 #include "esvr/workers.h"
-#include "support/temporary_folder.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
 namespace fs = std::filesystem;
 
-class Parts : public test::FolderTest {
+class Parts : public FolderTest {
  protected:
-  void SetUp() override { test::writeInput(at("in.vdb"), {{.voxels = test::cloud(8)}}); }
+  void SetUp() override { writeInput(at("in.vdb"), {{.voxels = cloud(8)}}); }
 
-  [[nodiscard]] std::vector<std::string> argumentsFor(const std::string& name,
-                                                      const std::vector<std::string>& more) const {
-    std::vector<std::string> all{at("in.vdb"),       at(name),     "--count",        "40",
-                                 "--iterations",     "60",         "--chunk-voxels", "600",
-                                 "--representation", "ellipsoids", "--device",       "cpu"};
-    all.insert(all.end(), more.begin(), more.end());
-    return all;
+  [[nodiscard]] Words argumentsFor(const std::string& name, const Words& more) const {
+    return joined({at("in.vdb"), at(name), "--count", "40", "--iterations", "60", "--chunk-voxels",
+                   "600", "--representation", "ellipsoids", "--device", "cpu"},
+                  more);
   }
-  [[nodiscard]] test::ProgramRun run(const std::string& name,
-                                     const std::vector<std::string>& more = {}) const {
-    return test::vdb2esvr(argumentsFor(name, more));
+  [[nodiscard]] ProgramRun run(const std::string& name, const Words& more = {}) const {
+    return vdb2esvr(argumentsFor(name, more));
   }
   void expectSameBytes(const std::string& name) const {
-    EXPECT_EQ(run("one.esvr").exitCode, 0);
-    EXPECT_EQ(test::readText(at(name)), test::readText(at("one.esvr")));
+    succeeded(run("one.esvr"));
+    EXPECT_EQ(readText(at(name)), readText(at("one.esvr")));
     EXPECT_FALSE(fs::exists(at(name) + ".parts"));
   }
   /// Interrupts a run that keeps its parts.
-  test::ProgramRun stopWithParts() const {
-    auto stopped =
-        test::runInterrupted(VDB2ESVR, argumentsFor("out.esvr", {"--resume", "--progress", "json"}),
-                             "\"parts_done\":3,");
+  ProgramRun stopWithParts() const {
+    auto stopped = runInterrupted(VDB2ESVR, argumentsFor("out.esvr", "--resume --progress json"),
+                                  "\"parts_done\":3,");
     EXPECT_EQ(stopped.exitCode, 1);
     EXPECT_FALSE(anyPart().empty());
     return stopped;
@@ -71,27 +49,26 @@ class Parts : public test::FolderTest {
 };
 
 TEST_F(Parts, ofAnInterruptedRunAreUsedAgain) {
-  const auto stopped = stopWithParts();
-  EXPECT_THAT(stopped.err, HasSubstr("the same command continues"));
+  EXPECT_THAT(stopWithParts().err, HasSubstr("the same command continues"));
   EXPECT_FALSE(fs::exists(at("out.esvr")));
-  const auto resumed = run("out.esvr", {"--resume"});
-  EXPECT_EQ(resumed.exitCode, 0) << resumed.err;
+  succeeded(run("out.esvr", "--resume"));
   expectSameBytes("out.esvr");
 }
 
 TEST_F(Parts, ofAnotherFitAreNotNamedByARunThatKeepsNone) {
   fs::create_directory(at("out.esvr.parts"));
-  const auto stopped = test::runInterrupted(
-      VDB2ESVR, argumentsFor("out.esvr", {"--progress", "json"}), "\"parts_done\":3,");
-  EXPECT_THAT(stopped.err, AllOf(HasSubstr("interrupted"), Not(HasSubstr("out.esvr.parts"))));
+  EXPECT_THAT(
+      runInterrupted(VDB2ESVR, argumentsFor("out.esvr", "--progress json"), "\"parts_done\":3,")
+          .err,
+      Says("interrupted", Not(HasSubstr("out.esvr.parts"))));
 }
 
 TEST_F(Parts, areReportedAsJson) {
-  std::istringstream lines(run("out.esvr", {"--progress", "json"}).err);
+  std::istringstream lines(run("out.esvr", "--progress json").err);
   int count = 0;
   double fraction = 0.0;
   for (std::string line; std::getline(lines, line); ++count) {
-    const auto json = nlohmann::json::parse(line);
+    const auto json = Json::parse(line);
     EXPECT_EQ(json["grid"], "density");
     EXPECT_GE(json["fraction"], fraction);
     EXPECT_LE(json["parts_done"], json["parts"]);
@@ -104,59 +81,47 @@ TEST_F(Parts, areReportedAsJson) {
 TEST_F(Parts, thatAreDamagedAreRefused) {
   stopWithParts();
   fs::resize_file(anyPart(), 100);
-  const auto resumed = run("out.esvr", {"--resume"});
-  EXPECT_EQ(resumed.exitCode, 3);
-  EXPECT_THAT(resumed.err, HasSubstr("is damaged; remove it"));
+  EXPECT_THAT(run("out.esvr", "--resume"), Fails(3, "is damaged; remove it"));
 }
 
 TEST_F(Parts, ofAnotherRunAreRefusedWithBothNames) {
   stopWithParts();
-  const auto otherOption = run("out.esvr", {"--resume", "--seed", "5"});
-  EXPECT_EQ(otherOption.exitCode, 3);
-  EXPECT_THAT(otherOption.err, HasSubstr("its seed is 1, not 5"));
+  EXPECT_THAT(run("out.esvr", "--resume --seed 5"), Fails(3, "its seed is 1, not 5"));
   fs::copy_file(at("in.vdb"), at("other.vdb"));
-  auto arguments = argumentsFor("out.esvr", {"--resume"});
+  auto arguments = argumentsFor("out.esvr", "--resume");
   arguments[0] = at("other.vdb");
-  const auto otherInput = test::vdb2esvr(arguments);
-  EXPECT_EQ(otherInput.exitCode, 3);
-  EXPECT_THAT(otherInput.err, AllOf(HasSubstr("in.vdb, not "), HasSubstr("other.vdb")));
+  EXPECT_THAT(vdb2esvr(arguments), Fails(3, "in.vdb, not ", "other.vdb"));
 }
 
 TEST_F(Parts, areNotUsedByTwoRunsAtATime) {
   const PartStore store(at("out.esvr.parts"), {}, PartStore::Access::kAlone);
-  const auto second = run("out.esvr", {"--resume"});
-  EXPECT_EQ(second.exitCode, 1);
-  EXPECT_THAT(second.err, HasSubstr("another process uses"));
+  EXPECT_THAT(run("out.esvr", "--resume"), Fails(1, "another process uses"));
 }
 
 TEST_F(Parts, cannotBeKeptOnAFullDisk) {
   std::string command = VDB2ESVR;
-  for (const auto& argument : argumentsFor("out.esvr", {"--resume"})) command += ' ' + argument;
-  const auto full = test::runOnFullDisk(command);
-  EXPECT_EQ(full.exitCode, 1);
-  EXPECT_THAT(full.err, AllOf(HasSubstr("out.esvr.parts/"), HasSubstr("File too large")));
-  EXPECT_EQ(run("out.esvr", {"--resume"}).exitCode, 0);
+  for (const auto& argument : argumentsFor("out.esvr", "--resume")) command += ' ' + argument;
+  EXPECT_THAT(runOnFullDisk(command), Fails(1, "out.esvr.parts/", "File too large"));
+  succeeded(run("out.esvr", "--resume"));
   expectSameBytes("out.esvr");
 }
 
 TEST_F(Parts, keepFilesOfOthersInTheirFolder) {
   fs::create_directory(at("out.esvr.parts"));
-  test::writeText(at("out.esvr.parts/notes.txt"), "mine");
-  EXPECT_EQ(run("out.esvr", {"--resume"}).exitCode, 0);
-  EXPECT_EQ(test::readText(at("out.esvr.parts/notes.txt")), "mine");
+  writeText(at("out.esvr.parts/notes.txt"), "mine");
+  succeeded(run("out.esvr", "--resume"));
+  EXPECT_EQ(readText(at("out.esvr.parts/notes.txt")), "mine");
   EXPECT_EQ(std::distance(fs::directory_iterator(at("out.esvr.parts")), {}), 1);
 }
 
 TEST_F(Parts, followNoLinkInTheirFolder) {
-  test::writeText(at("precious"), "mine");
+  writeText(at("precious"), "mine");
   for (const char* name : {"lock", "origin"}) {
     fs::remove_all(at("out.esvr.parts"));
     fs::create_directory(at("out.esvr.parts"));
     fs::create_symlink(at("precious"), at("out.esvr.parts/") + name);
-    const auto refused = run("out.esvr", {"--resume"});
-    EXPECT_EQ(refused.exitCode, 1);
-    EXPECT_THAT(refused.err, HasSubstr("not a regular file"));
-    EXPECT_EQ(test::readText(at("precious")), "mine");
+    EXPECT_THAT(run("out.esvr", "--resume"), Fails(1, "not a regular file"));
+    EXPECT_EQ(readText(at("precious")), "mine");
   }
 }
 
@@ -181,21 +146,19 @@ VolumeGrid denseGrid() {
   return grid;
 }
 
-test::ProgramRun limited(const std::string& program, const std::vector<std::string>& arguments) {
+ProgramRun limited(const std::string& program, const Words& arguments) {
   std::string line = "ulimit -d " + std::string(kLimit) + "; exec " + program;
   for (const auto& argument : arguments) line += " '" + argument + "'";
-  return test::runProgram("/bin/sh", {"-c", line});
+  return runShell(line);
 }
 
 TEST(OutOfCore, SlowVolumeLargerThanTheMemoryGoesThereAndBack) {
-  const test::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const std::string in = folder / "in.vdb", file = folder / "out.esvr", back = folder / "back.vdb";
   writeGrids(in, {}, std::vector{denseGrid()}, {.constantTiles = false});
-  const std::vector<std::string> memory{"--max-memory", kMaxMemory, "--scratch",
-                                        folder.path().string()};
-  const auto run = [&](const std::string& program, std::vector<std::string> arguments) {
-    arguments.insert(arguments.end(), memory.begin(), memory.end());
-    const auto ended = limited(program, arguments);
+  const Words memory{"--max-memory", kMaxMemory, "--scratch", folder.path().string()};
+  const auto run = [&](const std::string& program, const Words& arguments) {
+    const auto ended = limited(program, joined(arguments, memory));
     EXPECT_EQ(ended.exitCode, 0) << program << ended.out << ended.err;
   };
   run(VDB2ESVR, {in, file, "--count", "300", "--iterations", "1", "--storage", "float32",
@@ -207,18 +170,16 @@ TEST(OutOfCore, SlowVolumeLargerThanTheMemoryGoesThereAndBack) {
 /// Enough for a small volume without its voxels.
 constexpr const char* kLittle = "40KB";
 
-class Scratch : public test::Vdb2Esvr {
+class Scratch : public Vdb2Esvr {
  protected:
-  using Arguments = std::vector<std::string>;
+  using Arguments = Words;
 
   [[nodiscard]] Arguments withLittle(Arguments more, const std::string& scratch) const {
-    more.insert(more.end(), {"--max-memory", kLittle, "--scratch", scratch});
-    return more;
+    return joined(more, {"--max-memory", kLittle, "--scratch", scratch});
   }
-  [[nodiscard]] test::ProgramRun fitWithLittle(const std::string& output,
-                                               const std::string& scratch,
-                                               const Arguments& more = {}) const {
-    return test::quickFit(in(), output, withLittle(more, scratch));
+  [[nodiscard]] ProgramRun fitWithLittle(const std::string& output, const std::string& scratch,
+                                         const Arguments& more = {}) const {
+    return quickFit(in(), output, withLittle(more, scratch));
   }
   [[nodiscard]] std::string here() const { return folder_.path().string(); }
 };
@@ -226,10 +187,9 @@ class Scratch : public test::Vdb2Esvr {
 TEST_F(Scratch, HoldsVoxelsAndChangesNoBit) {
   for (const Arguments& form : {Arguments{}, {"--storage", "float32"}}) {
     const std::string little = folder_ / "little.esvr";
-    ASSERT_EQ(test::quickFit(in(), out(), form).exitCode, 0);
-    const auto run = fitWithLittle(little, here(), form);
-    ASSERT_EQ(run.exitCode, 0) << run.err;
-    EXPECT_EQ(test::readText(little), test::readText(out()));
+    succeeded(quickFit(in(), out(), form));
+    succeeded(fitWithLittle(little, here(), form));
+    EXPECT_EQ(readText(little), readText(out()));
     std::filesystem::remove(little);
     std::filesystem::remove(out());
   }
@@ -238,25 +198,20 @@ TEST_F(Scratch, HoldsVoxelsAndChangesNoBit) {
 TEST_F(Scratch, HoldsVoxelsOfLosslessFilesOnTheWayThereAndBack) {
   const Arguments there{in(), out(), "--lossless"}, back{out(), folder_ / "back.vdb"},
       check{"check", in(), folder_ / "back.vdb", "--max-error", "0", "--fail-on", "all"};
-  const auto converted = test::vdb2esvr(withLittle(there, here()));
-  ASSERT_EQ(converted.exitCode, 0) << converted.err;
-  const auto restored = test::esvr2vdb(withLittle(back, here()));
-  ASSERT_EQ(restored.exitCode, 0) << restored.err;
-  const auto checked = test::runProgram(ESVR_COMPARE, withLittle(check, here()));
-  EXPECT_EQ(checked.exitCode, 0) << checked.out << checked.err;
+  succeeded(vdb2esvr(withLittle(there, here())));
+  succeeded(esvr2vdb(withLittle(back, here())));
+  succeeded(runProgram(ESVR_COMPARE, withLittle(check, here())));
 }
 
 // No file can be made in /proc, for root either.
 TEST_F(Scratch, WithoutRoomIsAnErrorThatNamesTheFolder) {
-  const auto run = fitWithLittle(out(), "/proc");
-  EXPECT_EQ(run.exitCode, 5);
-  EXPECT_THAT(run.err, HasSubstr("of files in /proc, which has 0 MB free"));
+  EXPECT_THAT(fitWithLittle(out(), "/proc"), Fails(5, "of files in /proc, which has 0 MB free"));
   EXPECT_FALSE(outIsThere());
 }
 
 TEST_F(Scratch, IsAFolderThatExistsInEveryProgram) {
   const std::string missing = folder_ / "missing";
-  ASSERT_EQ(fitQuickly().exitCode, 0);
+  succeeded(fitQuickly());
   const std::vector<std::pair<const char*, Arguments>> runs{
       {VDB2ESVR, {in(), folder_ / "a.esvr"}},
       {ESVR2VDB, {out(), folder_ / "a.vdb"}},
@@ -265,12 +220,11 @@ TEST_F(Scratch, IsAFolderThatExistsInEveryProgram) {
       {ESVR_COMPARE, {"table", in(), out()}},
       {ESVR_COMPARE, {"curves", in(), out(), "-o", folder_ / "c"}}};
   for (auto [program, arguments] : runs) {
-    arguments.insert(arguments.end(), {"--scratch", missing});
-    const auto run = test::runProgram(program, arguments);
+    const auto run = runProgram(program, joined(arguments, {"--scratch", missing}));
     EXPECT_EQ(run.exitCode, 2) << program << run.out;
-    EXPECT_THAT(run.err, AllOf(HasSubstr("--scratch"), HasSubstr(missing))) << program;
+    EXPECT_THAT(run.err, Says("--scratch", missing)) << program;
   }
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

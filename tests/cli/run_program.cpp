@@ -9,6 +9,7 @@
 #include <chrono>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
@@ -47,13 +48,13 @@ constexpr const char *kOut = "out", *kErr = "err";
 
 }  // namespace
 
-RunningProgram::RunningProgram(const fs::path& program, const std::vector<std::string>& arguments) {
+RunningProgram::RunningProgram(const fs::path& program, const Words& arguments) {
   SpawnActions actions;
   actions.open(STDIN_FILENO, "/dev/null", O_RDONLY);
   actions.open(STDOUT_FILENO, folder_ / kOut, O_WRONLY | O_CREAT);
   actions.open(STDERR_FILENO, folder_ / kErr, O_WRONLY | O_CREAT);
   std::string name = program.string();
-  std::vector<std::string> words = arguments;
+  Words words = arguments;
   std::vector<char*> argv{name.data()};
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -90,11 +91,11 @@ ProgramRun RunningProgram::wait() {
   return {exitCodeOf(status), out(), err()};
 }
 
-ProgramRun runProgram(const fs::path& program, const std::vector<std::string>& arguments) {
+ProgramRun runProgram(const fs::path& program, const Words& arguments) {
   return RunningProgram(program, arguments).wait();
 }
 
-ProgramRun runInterrupted(const fs::path& program, const std::vector<std::string>& arguments,
+ProgramRun runInterrupted(const fs::path& program, const Words& arguments,
                           const std::string& sign) {
   RunningProgram process(program, arguments);
   const auto ready = [&] {
@@ -103,6 +104,13 @@ ProgramRun runInterrupted(const fs::path& program, const std::vector<std::string
   while (process.runs() && !ready()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   process.send(SIGINT);
   return process.wait();
+}
+
+ProgramRun succeeded(ProgramRun run, const char* file, int line) {
+  if (run.exitCode == 0) return run;
+  std::ostringstream message;
+  message << file << ':' << line << ": a program failed: " << run;
+  throw std::runtime_error(message.str());
 }
 
 void writeText(const fs::path& path, const std::string& text) {

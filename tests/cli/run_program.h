@@ -6,24 +6,61 @@
 #include <sys/types.h>
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <ostream>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "support/messages.h"
 #include "support/temporary_folder.h"
 
 namespace esvr::test {
+
+using Json = nlohmann::json;
+
+/// Arguments as a list, or as a text with spaces between them.
+struct Words : std::vector<std::string> {
+  using vector::vector;
+  Words() = default;
+  Words(std::vector<std::string> words) : vector(std::move(words)) {}
+  Words(const char* text) {
+    std::istringstream words(text);
+    for (std::string word; words >> word;) push_back(word);
+  }
+};
+
+/// One list of arguments after the other.
+[[nodiscard]] inline Words joined(Words words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
 
 struct ProgramRun {
   int exitCode = -1;  ///< 128 + the number of the signal if a signal ended the program
   std::string out, err;
 };
+inline std::ostream& operator<<(std::ostream& out, const ProgramRun& run) {
+  return out << "exit code " << run.exitCode << '\n' << run.out << run.err;
+}
+
+/// \return the run, which must have ended with 0: otherwise the test fails here, with what it printed
+ProgramRun succeeded(ProgramRun run, const char* file = __builtin_FILE(),
+                     int line = __builtin_LINE());
+
+/// A run that ended with this code and an error output that has these parts.
+template <class... Parts>
+auto Fails(int code, const Parts&... parts) {
+  return testing::AllOf(testing::Field("exitCode", &ProgramRun::exitCode, code),
+                        testing::Field("err", &ProgramRun::err, Says(parts...)));
+}
 
 /// A program that runs without a shell, so that the arguments arrive unchanged. The standard input is
 /// empty.
 class RunningProgram {
  public:
-  RunningProgram(const std::filesystem::path& program, const std::vector<std::string>& arguments);
+  RunningProgram(const std::filesystem::path& program, const Words& arguments);
   /// Kills the program if nobody has waited for it.
   ~RunningProgram();
   RunningProgram(const RunningProgram&) = delete;
@@ -45,13 +82,15 @@ class RunningProgram {
 };
 
 /// Runs a program until it ends.
-ProgramRun runProgram(const std::filesystem::path& program,
-                      const std::vector<std::string>& arguments);
+ProgramRun runProgram(const std::filesystem::path& program, const Words& arguments);
+
+/// Runs a line of a shell.
+inline ProgramRun runShell(const std::string& line) { return runProgram("/bin/sh", {"-c", line}); }
 
 /// Interrupts the program with SIGINT as soon as it handles this signal and its error output
 /// contains `sign`.
-ProgramRun runInterrupted(const std::filesystem::path& program,
-                          const std::vector<std::string>& arguments, const std::string& sign = "");
+ProgramRun runInterrupted(const std::filesystem::path& program, const Words& arguments,
+                          const std::string& sign = "");
 
 void writeText(const std::filesystem::path& path, const std::string& text);
 [[nodiscard]] std::string readText(const std::filesystem::path& path);
@@ -63,8 +102,8 @@ class FolderTest : public testing::Test {
     return std::filesystem::file_size(at(name));
   }
   /// The names of all files that are no inputs, whose names begin with "in.".
-  [[nodiscard]] std::vector<std::string> outputs() const {
-    std::vector<std::string> names = folder_.names();
+  [[nodiscard]] Words outputs() const {
+    Words names = folder_.names();
     std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
     return names;
   }
@@ -72,23 +111,20 @@ class FolderTest : public testing::Test {
 };
 
 struct Refusal {
-  std::vector<std::string> arguments;  ///< "DIR/" stands for the test's folder
+  Words arguments;  ///< "DIR/" stands for the test's folder
   int code;
   const char* words;  ///< in the message
 
-  [[nodiscard]] std::vector<std::string> argumentsIn(const TemporaryFolder& folder) const {
+  [[nodiscard]] Words argumentsIn(const TemporaryFolder& folder) const {
     const std::string place = folder / "";
-    std::vector<std::string> all = arguments;
+    Words all = arguments;
     for (std::string& argument : all)
       for (std::size_t i = 0; (i = argument.find("DIR/", i)) != std::string::npos;
            i += place.size())
         argument.replace(i, 4, place);
     return all;
   }
-  void expectOf(const ProgramRun& run) const {
-    EXPECT_EQ(run.exitCode, code) << run.err;
-    EXPECT_THAT(run.err, testing::HasSubstr(words));
-  }
+  void expectOf(const ProgramRun& run) const { EXPECT_THAT(run, Fails(code, words)); }
 };
 inline std::ostream& operator<<(std::ostream& out, const Refusal& refusal) {
   return out << testing::PrintToString(refusal.arguments);

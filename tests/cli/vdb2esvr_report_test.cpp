@@ -1,45 +1,24 @@
-// Plan: the JSON report of a run is compared with the file that the run wrote, with the voxels
-// that come back from this file, and with the options. A run that fails has a report, too.
-// docs/report.md names exactly the keys that reports have. The reports of several runs are merged,
-// so that they have every key that a run can write. They are compared with the tables of the
-// document: each key must be in both.
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+// Plan: the JSON report of a run agrees with the file that the run wrote, the voxels that come back
+// from it, and the options. docs/report.md names exactly the keys that the reports of several runs,
+// which together have every key, have.
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
-#include <sstream>
-#include <string>
-#include <vector>
 
-#include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
-#include "esvr/container.h"
-#include "esvr/metrics.h"
-#include "esvr/vdb_io.h"
+#include "cli/conversion.h"
 #include "field/random_field.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using test::softBall;
-using test::Vdb2Esvr;
-using test::vdb2esvr;
 using testing::HasSubstr;
 
-using Json = nlohmann::json;
-
 TEST_F(Vdb2Esvr, reportsWhatTheFileHolds) {
-  const auto run = fitQuickly({"--report", "-"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(fitQuickly("--report -"));
   const Json report = Json::parse(run.out);
   EXPECT_TRUE(report["error"].is_null());
   const Json& grid = report["grids"][0];
@@ -53,10 +32,10 @@ TEST_F(Vdb2Esvr, reportsWhatTheFileHolds) {
 }
 
 TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
-  const auto run = vdb2esvr({in(), out(), "--paper", "epochs=28,points=60,beta=0.5", "--paper",
-                             "prune-score=no-fa,densify-threshold=0,rates=1e-4:2e-3:1e-3:1e-2",
-                             "--count", "40", "--report", "-", "--device", "cpu"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run =
+      succeeded(vdb2esvr({in(), out(), "--paper", "epochs=28,points=60,beta=0.5", "--paper",
+                          "prune-score=no-fa,densify-threshold=0,rates=1e-4:2e-3:1e-3:1e-2",
+                          "--count", "40", "--report", "-", "--device", "cpu"}));
   const Json report = Json::parse(run.out);
   EXPECT_EQ(report["asked"]["method"], "paper");
   EXPECT_EQ(report["asked"]["storage"], "float32");
@@ -75,13 +54,12 @@ TEST_F(Vdb2Esvr, reportsWhatThePapersMethodUsed) {
 }
 
 TEST_F(Vdb2Esvr, dividesByTheGridsThatWereConverted) {
-  test::writeInput(in(), {{.name = "density", .voxels = softBall({})},
-                          {.name = "heat", .voxels = softBall({40, 0, 0})}});
+  writeInput(in(), {{.name = "density", .voxels = softBall({})},
+                    {.name = "heat", .voxels = softBall({40, 0, 0})}});
   const std::string path = folder_ / "r.json";
-  const auto run = fitQuickly({"-g", "heat", "--report", path});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("1 of 2 grids"));
-  const Json report = Json::parse(test::readText(path));
+  EXPECT_THAT(succeeded(fitQuickly({"-g", "heat", "--report", path})).out,
+              HasSubstr("1 of 2 grids"));
+  const Json report = Json::parse(readText(path));
   const double converted = report["input"]["bytes_converted"], all = report["input"]["bytes"];
   EXPECT_LT(converted, 0.6 * all);  // two equal grids
   EXPECT_GT(converted, 0.2 * all);
@@ -92,7 +70,7 @@ TEST_F(Vdb2Esvr, reportsAFailureToo) {
   const std::string report = folder_ / "r.json";
   const auto run = vdb2esvr({in(), out(), "--size", "99", "--report", report});
   ASSERT_EQ(run.exitCode, 2);
-  const Json json = Json::parse(test::readText(report));
+  const Json json = Json::parse(readText(report));
   EXPECT_EQ(json["exit_code"], 2);
   EXPECT_EQ(json["error"]["kind"], "usage");
   EXPECT_THAT(std::string(json["error"]["message"]), HasSubstr("99"));
@@ -100,18 +78,18 @@ TEST_F(Vdb2Esvr, reportsAFailureToo) {
 }
 
 TEST_F(Vdb2Esvr, reportsNullForAPsnrWithoutError) {
-  test::writeInput(in(), {{.voxels = softBall({}, 0.0f)}});
+  writeInput(in(), {{.voxels = softBall({}, 0.0f)}});
   const std::string report = folder_ / "r.json";
-  ASSERT_EQ(fitQuickly({"--report", report}).exitCode, 0);
-  const Json json = Json::parse(test::readText(report));
+  succeeded(fitQuickly({"--report", report}));
+  const Json json = Json::parse(readText(report));
   EXPECT_TRUE(json["grids"][0]["metrics"]["psnr_box"].is_null());
 }
 
 TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
-  const auto run = fitQuickly({"--report", "-"});
+  const auto run = fitQuickly("--report -");
   const Json grid = Json::parse(run.out)["grids"][0], metrics = grid["metrics"];
   const std::string back = folder_ / "back.vdb";
-  ASSERT_EQ(test::esvr2vdb({out(), back}).exitCode, 0);
+  succeeded(esvr2vdb({out(), back}));
   const VolumeMetrics m = compareVolumes(readGrid(in(), "density").volume,
                                          readGrid(back, "density").volume, {.transmittance = true});
   EXPECT_EQ(metrics["psnr_box"].get<double>(), m.psnrBox);
@@ -125,19 +103,16 @@ TEST_F(Vdb2Esvr, reportsTheErrorOfTheVoxelsThatComeBack) {
 }
 
 TEST_F(Vdb2Esvr, reportsTransmittanceOnlyOfWhatIsLookedThrough) {
-  test::writeInput(in(),
-                   {{.voxels = softBall({})},
+  writeInput(in(), {{.voxels = softBall({})},
                     {.name = "cold", .voxels = softBall({}, -1.0f)},
                     {.name = "ambient", .voxels = softBall({}, 1.0f, 2.0f), .background = 2.0f}});
-  const auto run = fitQuickly({"--report", "-"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(fitQuickly("--report -"));
   const Json grids = Json::parse(run.out)["grids"];
   EXPECT_TRUE(grids[0]["quality"].is_object());
   EXPECT_TRUE(grids[1]["quality"].is_null()) << "no column has a depth above 0";
   EXPECT_TRUE(grids[2]["quality"].is_null()) << "space without voxels is not empty";
 }
 
-using Json = nlohmann::json;
 using Keys = std::set<std::string>;
 using Table = std::map<std::string, std::string>;  // meaning of each key
 
@@ -234,40 +209,36 @@ void expectTable(const Json& object, const Table& table, const Keys& others,
       expectNamed(object[key], meaning, where + "." + key);
 }
 
-class ReportDoc : public test::FolderTest {
+class ReportDoc : public FolderTest {
  protected:
   /// Runs a program and merges its report into `all_`.
-  void add(const char* program, std::vector<std::string> arguments, int exitCode = 0) {
-    arguments.insert(arguments.end(), {"--report", at("r.json"), "--force"});
-    const auto run = test::runProgram(program, arguments);
-    ASSERT_EQ(run.exitCode, exitCode) << run.err;
-    merge(all_, Json::parse(test::readText(at("r.json"))));
+  void add(const char* program, const Words& arguments, int exitCode = 0) {
+    EXPECT_THAT(runProgram(program, joined(arguments, {"--report", at("r.json"), "--force"})),
+                Fails(exitCode));
+    merge(all_, Json::parse(readText(at("r.json"))));
   }
 
-  std::string document_ = test::readText(ESVR_SOURCE_DIR "/docs/report.md");
+  std::string document_ = readText(ESVR_SOURCE_DIR "/docs/report.md");
   Json all_;
 };
 
 TEST_F(ReportDoc, namesTheKeysOfAConversion) {
-  test::writeMixedInput(at("in.vdb"), {{.voxels = test::softBall({})}});
-  test::writeInput(at("cloud.vdb"), {{.voxels = test::cloud(12)}});
-  const std::vector<std::string> quick{"--device", "cpu", "--iterations", "60"};
-  const auto convert = [&](const char* input, std::vector<std::string> more) {
-    more.insert(more.begin(), {at(input), at("out.esvr")});
-    more.insert(more.end(), quick.begin(), quick.end());
-    add(VDB2ESVR, more);
+  writeMixedInput(at("in.vdb"), {{.voxels = softBall({})}});
+  writeInput(at("cloud.vdb"), {{.voxels = cloud(12)}});
+  const Words quick{"--device", "cpu", "--iterations", "60"};
+  const auto convert = [&](const char* input, const Words& more) {
+    add(VDB2ESVR, joined(joined({at(input), at("out.esvr")}, more), quick));
   };
-  convert("in.vdb", {"--count", "30"});
-  std::vector<test::InputVoxel> gaps = test::softBall({});
+  convert("in.vdb", "--count 30");
+  std::vector<InputVoxel> gaps = softBall({});
   gaps.front().value = std::numeric_limits<float>::quiet_NaN();
-  test::writeInput(at("gaps.vdb"), {{.voxels = gaps}});
-  convert("gaps.vdb", {"--max-error", "5%", "--nonfinite", "keep"});
-  convert("cloud.vdb", {"--max-error", "5%"});
-  test::writeInput(at("surface.vdb"),
-                   {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});
-  convert("surface.vdb", {"--max-error", "5%"});
-  test::writeVectorInput(at("wind.vdb"), {.voxels = test::softBall({})});
-  convert("wind.vdb", {"--count", "30", "--representation", "ellipsoids"});
+  writeInput(at("gaps.vdb"), {{.voxels = gaps}});
+  convert("gaps.vdb", "--max-error 5% --nonfinite keep");
+  convert("cloud.vdb", "--max-error 5%");
+  writeInput(at("surface.vdb"), {{.voxels = distances(10), .background = 20.0f, .levelSet = true}});
+  convert("surface.vdb", "--max-error 5%");
+  writeVectorInput(at("wind.vdb"), {.voxels = softBall({})});
+  convert("wind.vdb", "--count 30 --representation ellipsoids");
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--paper", "epochs=28,points=60", "--count", "40",
                  "--device", "cpu"});
 
@@ -284,8 +255,8 @@ TEST_F(ReportDoc, namesTheKeysOfAConversion) {
 }
 
 TEST_F(ReportDoc, namesTheKeysOfASequence) {
-  test::writeInput(at("in.1.vdb"), {{.voxels = test::softBall({})}});
-  test::writeText(at("in.2.vdb"), "no volume");
+  writeInput(at("in.1.vdb"), {{.voxels = softBall({})}});
+  writeText(at("in.2.vdb"), "no volume");
   add(VDB2ESVR,
       {at("in.@.vdb"), at("out.@.esvr"), "--frames", "1-2", "--count", "30", "--iterations", "60",
        "--device", "cpu"},
@@ -300,14 +271,14 @@ TEST_F(ReportDoc, namesTheKeysOfASequence) {
 }
 
 TEST_F(ReportDoc, namesTheKeysOfTheProgressOfASequence) {
-  test::writeInput(at("in.1.vdb"), {{.voxels = test::softBall({})}});
-  const auto run = test::quickFit(at("in.@.vdb"), at("out.@.esvr"), {"--progress", "json"});
+  writeInput(at("in.1.vdb"), {{.voxels = softBall({})}});
+  const auto run = quickFit(at("in.@.vdb"), at("out.@.esvr"), "--progress json");
   const Table table = tableAfter(document_, "For a sequence, there is a line");
   EXPECT_EQ(keysOf(Json::parse(run.err)), keysOf(table));
 }
 
 TEST_F(ReportDoc, namesTheKeysOfAFailure) {
-  test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
+  writeInput(at("in.vdb"), {{.voxels = softBall({})}});
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--size", "99"}, 2);
   const std::string text = paragraphFrom(document_, "A run that writes no file");
   Keys keys = keysOf(all_);
@@ -317,8 +288,8 @@ TEST_F(ReportDoc, namesTheKeysOfAFailure) {
 }
 
 TEST_F(ReportDoc, namesTheKeysOfAPicture) {
-  test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
-  ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+  writeInput(at("in.vdb"), {{.voxels = softBall({})}});
+  succeeded(quickFit(at("in.vdb"), at("in.esvr")));
   add(ESVR_RENDER, {at("in.esvr"), at("p.png"), "--ref", at("in.vdb"), "--resolution", "16x16"});
   add(ESVR_RENDER, {at("in.esvr"), "--bench", "--turntable", "2", "--ref", at("in.vdb"),
                     "--resolution", "16x16", "--device", "cpu"});
@@ -331,20 +302,19 @@ TEST_F(ReportDoc, namesTheKeysOfAPicture) {
 class ComparisonDoc : public ReportDoc {
  protected:
   void SetUp() override {
-    test::writeInput(at("in.vdb"), {{.voxels = test::softBall({})}});
-    ASSERT_EQ(test::quickFit(at("in.vdb"), at("in.esvr")).exitCode, 0);
+    writeInput(at("in.vdb"), {{.voxels = softBall({})}});
+    succeeded(quickFit(at("in.vdb"), at("in.esvr")));
   }
 };
 
 TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
   // NanoVDB has no place for some metadata, which gives differences.
-  ASSERT_EQ(test::esvr2vdb({at("in.esvr"), at("back.nvdb")}).exitCode, 0);
+  succeeded(esvr2vdb({at("in.esvr"), at("back.nvdb")}));
   add(ESVR_COMPARE, {"check", at("in.vdb"), at("back.nvdb"), "--ssim"});
   for (const std::string frame : {"1", "2"})
-    test::writeInput(at("s." + frame + ".vdb"), {{.voxels = test::softBall({})}});
+    writeInput(at("s." + frame + ".vdb"), {{.voxels = softBall({})}});
   add(ESVR_COMPARE, {"check", at("s.@.vdb"), at("s.@.vdb")});
-  test::writeInput(at("surface.vdb"),
-                   {{.voxels = test::distances(10), .background = 20.0f, .levelSet = true}});
+  writeInput(at("surface.vdb"), {{.voxels = distances(10), .background = 20.0f, .levelSet = true}});
   add(ESVR_COMPARE, {"check", at("surface.vdb"), at("surface.vdb"), "--max-mesh-distance", "1",
                      "--max-relative-error", "1%"});
   expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
@@ -361,13 +331,11 @@ TEST_F(ComparisonDoc, namesTheKeysOfATable) {
 }
 
 TEST_F(ComparisonDoc, namesTheKeysOfCurves) {
-  const auto run =
-      test::runProgram(ESVR_COMPARE, {"curves", at("in.vdb"), at("in.esvr"), "--output", at("c"),
-                                      "--fit", "1KB", "--fps", "16", "--device", "cpu"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  merge(all_, Json::parse(test::readText(at("c.json"))));
+  succeeded(compare("curves", {at("in.vdb"), at("in.esvr"), "--output", at("c"), "--fit", "1KB",
+                               "--fps", "16", "--device", "cpu"}));
+  merge(all_, Json::parse(readText(at("c.json"))));
   expectTable(all_, tableAfter(document_, "The report of `curves`"), {}, "curves");
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -1,77 +1,53 @@
-// Plan: sequences of small volumes are converted as a user does. Each frame must have the bytes of
-// the conversion of its file alone, on any number of threads and beside any other frames. Frames
-// that are missing, damaged or interrupted are treated as the options say, and the report has an
-// entry for each. A sequence whose frames have grids that are not fitted is converted and
-// converted back. Each frame must have all of its grids, in order and with the bytes of the
-// source; the summary, the report and the warnings must tell what became of them, each thing once.
-
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+// Plan: each frame of a sequence has the bytes of the conversion of its file alone, on any number of
+// threads and beside any other frames, with all grids that are not fitted. The summary, the report and
+// the warnings tell what became of each frame and grid, each thing once.
 
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
-#include <nlohmann/json.hpp>
-#include <sstream>
 
-#include "cli/converters.h"
-#include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
-#include "esvr/container.h"
+#include "cli/conversion.h"
 #include "esvr/encode.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
-using test::bytesIn;
-using test::namesIn;
-using test::readText;
-using test::Refusal;
-using test::runInterrupted;
-using test::vdb2esvr;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
-using Words = std::vector<std::string>;
-
-class SequenceFiles : public test::FolderTest {
+class SequenceFiles : public FolderTest {
  protected:
   /// Balls of different values in in.0001.vdb, in.0002.vdb, ...
   void writeFrames(int count) const {
     for (int frame = 1; frame <= count; ++frame)
-      test::writeInput(at(nameOf("in", frame, "vdb")),
-                       {{.voxels = test::softBall({frame, 0, 0}, float(frame))}});
+      writeInput(at(nameOf("in", frame, "vdb")),
+                 {{.voxels = softBall({frame, 0, 0}, float(frame))}});
   }
   static std::string nameOf(const std::string& start, int frame, const std::string& end) {
     std::string digits = std::to_string(frame);
     digits.insert(0, 4 - digits.size(), '0');
     return start + "." + digits + "." + end;
   }
-  [[nodiscard]] test::ProgramRun convert(Words more = {},
-                                         const std::string& output = "out.####.esvr") const {
-    more.insert(more.begin(), {at("in.####.vdb"), at(output), "--device", "cpu"});
-    return vdb2esvr(more);
+  [[nodiscard]] ProgramRun convert(const Words& more = {},
+                                   const std::string& output = "out.####.esvr") const {
+    return vdb2esvr(joined({at("in.####.vdb"), at(output), "--device", "cpu"}, more));
   }
   /// Single fits, which take milliseconds.
-  [[nodiscard]] test::ProgramRun convertQuickly(const Words& more = {}) const {
-    return test::quickFit(at("in.####.vdb"), at("out.####.esvr"), more);
+  [[nodiscard]] ProgramRun convertQuickly(const Words& more = {}) const {
+    return quickFit(at("in.####.vdb"), at("out.####.esvr"), more);
   }
   [[nodiscard]] bool isThere(const std::string& name) const { return fs::exists(at(name)); }
 };
 
 TEST_F(SequenceFiles, haveTheBytesOfSingleFilesOnAnyNumberOfThreads) {
   writeFrames(5);
-  const auto run = convert({"--threads", "1"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  ASSERT_EQ(convert({"--threads", "4"}, "four.####.esvr").exitCode, 0);
-  ASSERT_EQ(convert({"--frames", "5,2"}, "some.####.esvr").exitCode, 0);
+  succeeded(convert("--threads 1"));
+  succeeded(convert("--threads 4", "four.####.esvr"));
+  succeeded(convert("--frames 5,2", "some.####.esvr"));
   for (int frame = 1; frame <= 5; ++frame) {
-    ASSERT_EQ(vdb2esvr({at(nameOf("in", frame, "vdb")), at("one.esvr"), "-f"}).exitCode, 0);
+    succeeded(vdb2esvr({at(nameOf("in", frame, "vdb")), at("one.esvr"), "-f"}));
     const std::string one = readText(at("one.esvr"));
     EXPECT_EQ(readText(at(nameOf("out", frame, "esvr"))), one);
     EXPECT_EQ(readText(at(nameOf("four", frame, "esvr"))), one);
@@ -84,14 +60,12 @@ TEST_F(SequenceFiles, haveTheBytesOfSingleFilesOnAnyNumberOfThreads) {
 }
 
 TEST_F(SequenceFiles, haveAnyPatternAndAnyDigits) {
-  test::writeInput(at("in.0000.vdb"), {{.voxels = test::softBall({})}});
-  test::writeInput(at("in.-005.vdb"), {{.voxels = test::softBall({})}});
-  test::writeInput(at("in.12345.vdb"), {{.voxels = test::softBall({})}});
-  test::writeInput(at("in.7.vdb"), {{.voxels = test::softBall({})}});
-  const auto to = [&](const char* input, const char* output, Words more = {}) {
-    more.insert(more.begin(), {at(input), at(output)});
-    const auto run = vdb2esvr(more);
-    EXPECT_EQ(run.exitCode, 0) << run.err;
+  writeInput(at("in.0000.vdb"), {{.voxels = softBall({})}});
+  writeInput(at("in.-005.vdb"), {{.voxels = softBall({})}});
+  writeInput(at("in.12345.vdb"), {{.voxels = softBall({})}});
+  writeInput(at("in.7.vdb"), {{.voxels = softBall({})}});
+  const auto to = [&](const char* input, const char* output, const Words& more = {}) {
+    succeeded(vdb2esvr(joined({at(input), at(output)}, more)));
   };
   to("in.%04d.vdb", "out.@@@@@@@@@@@@.esvr", {"--frames", "-5-0x5"});
   to("in.$F4.vdb", "out.@.esvr");
@@ -103,13 +77,12 @@ TEST_F(SequenceFiles, haveAnyPatternAndAnyDigits) {
 TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
   // The first frame is smooth. The last one has waves, so that it needs more bytes.
   for (int frame = 1; frame <= 3; ++frame) {
-    auto voxels = test::cloud(12);
+    auto voxels = cloud(12);
     for (auto& voxel : voxels)
       voxel.value *= 1.0f + 0.2f * float(frame - 1) * float((voxel.at.x ^ voxel.at.y) & 1);
-    test::writeInput(at(nameOf("in", frame, "vdb")), {{.voxels = voxels}});
+    writeInput(at(nameOf("in", frame, "vdb")), {{.voxels = voxels}});
   }
-  const auto run = convert({"--report", "-"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(convert("--report -"));
   const Json range = Json::parse(run.out)["grids"][0]["psnr_t50"];
   // The bound of quantised voxels is found to within some hundredths of a dB, but the frames take some
   // 500 bytes, of which another lattice with a higher PSNR may save a few.
@@ -120,18 +93,14 @@ TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
 
 TEST_F(SequenceFiles, mayBeHeldOrSkippedWhereTheyAreMissing) {
   writeFrames(2);
-  test::writeInput(at("in.0005.vdb"), {{.voxels = test::softBall({})}});
-  const auto refused = convertQuickly({"--frames", "1-5"});
-  EXPECT_EQ(refused.exitCode, 3);
-  EXPECT_THAT(refused.err, HasSubstr("frames 3-4 are missing"));
+  writeInput(at("in.0005.vdb"), {{.voxels = softBall({})}});
+  EXPECT_THAT(convertQuickly("--frames 1-5"), Fails(3, "frames 3-4 are missing"));
   EXPECT_THAT(outputs(), IsEmpty());
 
-  const auto skipped = convertQuickly({"--frames", "1-5", "--missing", "skip"});
-  EXPECT_EQ(skipped.exitCode, 0) << skipped.err;
+  succeeded(convertQuickly("--frames 1-5 --missing skip"));
   EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr", "out.0005.esvr"));
 
-  const auto held = convertQuickly({"--frames", "1-5", "--missing", "hold", "-f"});
-  EXPECT_EQ(held.exitCode, 0) << held.err;
+  const auto held = succeeded(convertQuickly("--frames 1-5 --missing hold -f"));
   EXPECT_THAT(held.out, HasSubstr("held from 2"));
   for (const char* name : {"out.0003.esvr", "out.0004.esvr"})
     EXPECT_EQ(readText(at(name)), readText(at("out.0002.esvr")));
@@ -139,12 +108,10 @@ TEST_F(SequenceFiles, mayBeHeldOrSkippedWhereTheyAreMissing) {
 
 TEST_F(SequenceFiles, areNamedWhereTheyAreDamaged) {
   writeFrames(4);
-  test::writeText(at("in.0002.vdb"), "no volume");
-  const auto run = convertQuickly(
-      {"--report", at("r.json"), "--frames", "1-5", "--missing", "hold", "--threads", "1"});
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("vdb2esvr: frame 2: "), HasSubstr("in.0002.vdb"),
-                             HasSubstr("1 of 5 frames failed: 2")));
+  writeText(at("in.0002.vdb"), "no volume");
+  EXPECT_THAT(convertQuickly({"--report", at("r.json"), "--frames", "1-5", "--missing", "hold",
+                              "--threads", "1"}),
+              Fails(3, "vdb2esvr: frame 2: ", "in.0002.vdb", "1 of 5 frames failed: 2"));
   EXPECT_FALSE(isThere("out.0002.esvr"));
   for (const char* name : {"out.0001.esvr", "out.0003.esvr", "out.0004.esvr", "out.0005.esvr"})
     EXPECT_TRUE(isThere(name)) << name;
@@ -157,8 +124,8 @@ TEST_F(SequenceFiles, areNamedWhereTheyAreDamaged) {
 
 TEST_F(SequenceFiles, stopAfterADamagedOneWhereAsked) {
   writeFrames(4);
-  test::writeText(at("in.0002.vdb"), "no volume");
-  const auto run = convertQuickly({"--on-error", "stop", "--threads", "1"});
+  writeText(at("in.0002.vdb"), "no volume");
+  const auto run = convertQuickly("--on-error stop --threads 1");
   EXPECT_EQ(run.exitCode, 3);
   EXPECT_THAT(run.out, HasSubstr("not begun"));
   EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr"));
@@ -166,22 +133,19 @@ TEST_F(SequenceFiles, stopAfterADamagedOneWhereAsked) {
 
 TEST_F(SequenceFiles, thatHoldADamagedOneFailToo) {
   writeFrames(2);
-  test::writeText(at("in.0002.vdb"), "no volume");
-  const auto run = convertQuickly({"--frames", "1-3", "--missing", "hold"});
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("frame 3: frame 2, which it holds, failed"),
-                             HasSubstr("2 of 3 frames failed: 2-3")));
+  writeText(at("in.0002.vdb"), "no volume");
+  EXPECT_THAT(convertQuickly("--frames 1-3 --missing hold"),
+              Fails(3, "frame 3: frame 2, which it holds, failed", "2 of 3 frames failed: 2-3"));
 }
 
 TEST_F(SequenceFiles, areOneFileIfThePatternIsInTheNameOfAFolder) {
   writeFrames(2);
   for (const char* folder : {"out@farm", "out #2", "out100%d", "out$F", "out.####"}) {
     const std::string file = std::string(folder) + "/all.esvr";
-    EXPECT_EQ(convert({}, file).exitCode, 1) << "there is no folder " << folder;
+    EXPECT_THAT(convert({}, file), Fails(1)) << "there is no folder " << folder;
     EXPECT_THAT(outputs(), IsEmpty());
     std::filesystem::create_directories(at(folder));
-    const auto run = convert({}, file);
-    EXPECT_EQ(run.exitCode, 0) << run.err;
+    succeeded(convert({}, file));
     EXPECT_TRUE(std::filesystem::exists(at(file)));
     std::filesystem::remove_all(at(folder));
   }
@@ -189,29 +153,27 @@ TEST_F(SequenceFiles, areOneFileIfThePatternIsInTheNameOfAFolder) {
 
 TEST_F(SequenceFiles, withoutActiveVoxelsHaveNoSizeToKeepTo) {
   writeFrames(1);
-  test::writeInput(at("in.0002.vdb"), {{.name = "density"}});
-  test::writeInput(at("in.0003.vdb"), {{.name = "density"}, {.name = "flame"}});
+  writeInput(at("in.0002.vdb"), {{.name = "density"}});
+  writeInput(at("in.0003.vdb"), {{.name = "density"}, {.name = "flame"}});
   for (const char* output : {"out.####.esvr", "out.esvr"}) {
-    EXPECT_EQ(convert({"--ratio", "100", "--frames", "2-3"}, output).exitCode, 0);
-    EXPECT_EQ(convert({"--size", "5KB", "-f"}, output).exitCode, 0);
+    succeeded(convert("--ratio 100 --frames 2-3", output));
+    succeeded(convert("--size 5KB -f", output));
   }
 }
 
 TEST_F(SequenceFiles, haveASizeBesideAGridOfAFewVoxels) {
   for (int frame = 1; frame <= 2; ++frame)
-    test::writeInput(at(nameOf("in", frame, "vdb")),
-                     {{.voxels = test::cloud(12)},
-                      {.name = "flame", .voxels = {{{0, 0, 0}, 0.0f}, {{0, 0, 1}, 0.0f}}}});
-  const auto run = convert({"--size", "1500"});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+    writeInput(at(nameOf("in", frame, "vdb")),
+               {{.voxels = cloud(12)},
+                {.name = "flame", .voxels = {{{0, 0, 0}, 0.0f}, {{0, 0, 1}, 0.0f}}}});
+  succeeded(convert("--size 1500"));
   for (int frame = 1; frame <= 2; ++frame)
     EXPECT_LE(fs::file_size(at(nameOf("out", frame, "esvr"))), 1500u);
 }
 
 TEST_F(SequenceFiles, areReportedWithAnEntryEach) {
   writeFrames(3);
-  const auto run = convertQuickly({"--report", "-", "--frames", "3,1"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(convertQuickly("--report - --frames 3,1"));
   const Json report = Json::parse(run.out);
   EXPECT_EQ(report["schema"], "esvr-sequence");
   EXPECT_EQ(report["asked"]["count"], 30);
@@ -230,15 +192,14 @@ TEST_F(SequenceFiles, areReportedWithAnEntryEach) {
 }
 
 TEST_F(SequenceFiles, areReportedAlsoWhereNothingCanBeConverted) {
-  const auto run = convertQuickly({"--report", at("r.json")});
-  EXPECT_EQ(run.exitCode, 3);
+  EXPECT_THAT(convertQuickly({"--report", at("r.json")}), Fails(3));
   EXPECT_EQ(Json::parse(readText(at("r.json")))["error"]["kind"], "bad input");
 }
 
 TEST_F(SequenceFiles, tellTheirProgressAsJson) {
   writeFrames(3);
-  test::writeText(at("in.0003.vdb"), "no volume");
-  std::istringstream lines(convertQuickly({"--progress", "json"}).err);
+  writeText(at("in.0003.vdb"), "no volume");
+  std::istringstream lines(convertQuickly("--progress json").err);
   std::vector<Json> progress;
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with("{")) progress.push_back(Json::parse(line));
@@ -251,50 +212,41 @@ TEST_F(SequenceFiles, tellTheirProgressAsJson) {
 
 TEST_F(SequenceFiles, keepExistingFilesUnlessForced) {
   writeFrames(2);
-  test::writeText(at("out.0002.esvr"), "mine");
-  const auto refused = convertQuickly();
-  EXPECT_EQ(refused.exitCode, 1);
-  EXPECT_THAT(refused.err, HasSubstr("out.0002.esvr: it exists already"));
+  writeText(at("out.0002.esvr"), "mine");
+  EXPECT_THAT(convertQuickly(), Fails(1, "out.0002.esvr: it exists already"));
   EXPECT_FALSE(isThere("out.0001.esvr")) << "nothing begins";
-  EXPECT_EQ(convertQuickly({"--force"}).exitCode, 0);
+  succeeded(convertQuickly("--force"));
   EXPECT_NE(readText(at("out.0002.esvr")), "mine");
 }
 
 TEST_F(SequenceFiles, areContinuedWhereTheyAreMissingOnly) {
   writeFrames(3);
-  test::writeText(at("out.0002.esvr"), "mine");
-  const auto run = convertQuickly({"--resume"});
-  EXPECT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out, HasSubstr("kept"));
+  writeText(at("out.0002.esvr"), "mine");
+  EXPECT_THAT(succeeded(convertQuickly("--resume")).out, HasSubstr("kept"));
   EXPECT_EQ(readText(at("out.0002.esvr")), "mine");
   EXPECT_TRUE(isThere("out.0001.esvr") && isThere("out.0003.esvr"));
 }
 
 TEST_F(SequenceFiles, thatAreCompleteStayAfterAnInterruption) {
   writeFrames(2);
-  test::writeInput(at("in.0003.vdb"), {{.voxels = test::cloud(30)}});  // it takes seconds
+  writeInput(at("in.0003.vdb"), {{.voxels = cloud(30)}});  // it takes seconds
   const Words inOrder{"--representation", "ellipsoids", "--threads", "1"};
-  Words arguments{at("in.####.vdb"), at("out.####.esvr"), "--progress", "json", "--device", "cpu"};
-  arguments.insert(arguments.end(), inOrder.begin(), inOrder.end());
-  const auto stopped = runInterrupted(VDB2ESVR, arguments, "\"frames_done\":2");
-  EXPECT_EQ(stopped.exitCode, 1);
-  EXPECT_THAT(stopped.err, HasSubstr("interrupted; 2 of 3 frames are complete, and --resume"));
+  Words arguments = joined(
+      {at("in.####.vdb"), at("out.####.esvr"), "--progress", "json", "--device", "cpu"}, inOrder);
+  EXPECT_THAT(runInterrupted(VDB2ESVR, arguments, "\"frames_done\":2"),
+              Fails(1, "interrupted; 2 of 3 frames are complete, and --resume"));
   EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr"));
 
-  test::writeInput(at("in.0003.vdb"), {{.voxels = test::softBall({})}});
+  writeInput(at("in.0003.vdb"), {{.voxels = softBall({})}});
   arguments.emplace_back("--resume");
-  const auto continued = vdb2esvr(arguments);
-  EXPECT_EQ(continued.exitCode, 0) << continued.err;
-  EXPECT_THAT(continued.err, AllOf(HasSubstr("\"kept\""), HasSubstr("\"converted\"")));
+  EXPECT_THAT(succeeded(vdb2esvr(arguments)).err, Says("\"kept\"", "\"converted\""));
   EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr", "out.0003.esvr"));
 }
 
 TEST_F(SequenceFiles, thatMissTheirPsnrAreNamed) {
   writeFrames(3);
-  const auto run = convert(
-      {"--psnr", "90", "--count", "5", "--representation", "ellipsoids", "--iterations", "20"});
-  EXPECT_EQ(run.exitCode, 4);
-  EXPECT_THAT(run.err, HasSubstr("3 of 3 frames did not reach the PSNR: 1-3"));
+  EXPECT_THAT(convert("--psnr 90 --count 5 --representation ellipsoids --iterations 20"),
+              Fails(4, "3 of 3 frames did not reach the PSNR: 1-3"));
   EXPECT_TRUE(isThere("out.0001.esvr"));
 }
 
@@ -311,9 +263,8 @@ TEST_F(SequenceFiles, areConvertedOneByOneWhereMemoryIsShort) {
 }
 
 TEST_F(SequenceFiles, thatHaveTheNameOfAPatternAreFiles) {
-  test::writeInput(at("take#2.vdb"), {{.voxels = test::softBall({})}});
-  const auto run = test::quickFit(at("take#2.vdb"), at("out.esvr"));
-  EXPECT_EQ(run.exitCode, 0) << run.err;
+  writeInput(at("take#2.vdb"), {{.voxels = softBall({})}});
+  succeeded(quickFit(at("take#2.vdb"), at("out.esvr")));
   EXPECT_TRUE(isThere("out.esvr"));
 }
 
@@ -328,21 +279,19 @@ TEST_P(RefusedSequence, saysWhy) {
 INSTANTIATE_TEST_SUITE_P(
     Options, RefusedSequence,
     testing::Values(
-        Refusal{{"DIR/in.####.vdb", "DIR/out.png"}, 2, "must end in .esvr"},
+        Refusal{"DIR/in.####.vdb DIR/out.png", 2, "must end in .esvr"},
         Refusal{
             {"DIR/in.0001.vdb", "DIR/out.esvr", "--frames", "1"}, 2, "--frames needs a sequence"},
-        Refusal{{"DIR/in.0001.vdb", "DIR/out.esvr", "--missing", "skip"}, 2, "--missing needs"},
-        Refusal{{"DIR/in.0001.vdb", "DIR/out.esvr", "--on-error", "stop"}, 2, "--on-error needs"},
+        Refusal{"DIR/in.0001.vdb DIR/out.esvr --missing skip", 2, "--missing needs"},
+        Refusal{"DIR/in.0001.vdb DIR/out.esvr --on-error stop", 2, "--on-error needs"},
         Refusal{
             {"DIR/in.####.vdb", "DIR/out.####.esvr", "--frames", "1-x"}, 2, "'1-x' is no range"},
-        Refusal{{"DIR/in.####.vdb", "DIR/out.####.esvr", "--missing", "x"}, 2, "error, hold, skip"},
-        Refusal{{"DIR/in.####.vdb", "DIR/out.####.esvr", "--on-error", "x"}, 2, "continue, stop"},
-        Refusal{{"DIR/in.####.vdb", "DIR/out.####.png"}, 2, "must end in .esvr"},
-        Refusal{{"DIR/in.@.vdb", "DIR/out.@.esvr"}, 3, "has another number of digits"},
-        Refusal{{"DIR/no.####.vdb", "DIR/out.####.esvr"}, 3, "no file matches"},
-        Refusal{{"DIR/in.####.vdb", "DIR/out.####.esvr", "--resume", "-f"}, 2, "choose one"}));
-
-using Json = nlohmann::json;
+        Refusal{"DIR/in.####.vdb DIR/out.####.esvr --missing x", 2, "error, hold, skip"},
+        Refusal{"DIR/in.####.vdb DIR/out.####.esvr --on-error x", 2, "continue, stop"},
+        Refusal{"DIR/in.####.vdb DIR/out.####.png", 2, "must end in .esvr"},
+        Refusal{"DIR/in.@.vdb DIR/out.@.esvr", 3, "has another number of digits"},
+        Refusal{"DIR/no.####.vdb DIR/out.####.esvr", 3, "no file matches"},
+        Refusal{"DIR/in.####.vdb DIR/out.####.esvr --resume -f", 2, "choose one"}));
 
 std::size_t timesIn(const std::string& text, const std::string& words) {
   std::size_t count = 0;
@@ -351,11 +300,11 @@ std::size_t timesIn(const std::string& text, const std::string& words) {
 }
 
 /// Three frames with the grids bool, int32, vec3s, points and density.
-class CarriedSequence : public test::FolderTest {
+class CarriedSequence : public FolderTest {
  protected:
   void SetUp() override {
     for (int frame = 1; frame <= 3; ++frame)
-      test::writeMixedInput(in(frame), {{.voxels = test::softBall({frame, 0, 0})}});
+      writeMixedInput(in(frame), {{.voxels = softBall({frame, 0, 0})}});
   }
   [[nodiscard]] std::string in(int frame) const {
     return at("in." + std::to_string(frame) + ".vdb");
@@ -366,36 +315,31 @@ class CarriedSequence : public test::FolderTest {
   [[nodiscard]] std::string back(int frame) const {
     return at("back." + std::to_string(frame) + ".vdb");
   }
-  [[nodiscard]] test::ProgramRun convert(const std::vector<std::string>& more = {}) const {
-    return test::quickFit(at("in.@.vdb"), at("out.@.esvr"), more);
+  [[nodiscard]] ProgramRun convert(const Words& more = {}) const {
+    return quickFit(at("in.@.vdb"), at("out.@.esvr"), more);
   }
-  [[nodiscard]] test::ProgramRun convertBack(const std::string& output,
-                                             std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {at("out.@.esvr"), at(output), "--threads", "3"});
-    return test::esvr2vdb(more);
+  [[nodiscard]] ProgramRun convertBack(const std::string& output, const Words& more = {}) const {
+    return esvr2vdb(joined({at("out.@.esvr"), at(output), "--threads", "3"}, more));
   }
 };
 
 TEST_F(CarriedSequence, GivesAllGridsOfEachFrameBackInOrder) {
-  ASSERT_EQ(convert({"--threads", "3"}).exitCode, 0);
-  const auto run = convertBack("back.@.vdb");
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  succeeded(convert("--threads 3"));
+  succeeded(convertBack("back.@.vdb"));
   for (int frame = 1; frame <= 3; ++frame) {
     EXPECT_EQ(namesIn(back(frame)), namesIn(in(frame)));
     EXPECT_EQ(bytesIn(back(frame), {0, 1, 2, 3}), bytesIn(in(frame), {0, 1, 2, 3}));
-    ASSERT_EQ(test::quickFit(in(frame), at("one.esvr"), {"-f"}).exitCode, 0);
-    EXPECT_EQ(test::readText(out(frame)), test::readText(at("one.esvr"))) << "that of the file";
+    succeeded(quickFit(in(frame), at("one.esvr"), "-f"));
+    EXPECT_EQ(readText(out(frame)), readText(at("one.esvr"))) << "that of the file";
   }
 }
 
 TEST_F(CarriedSequence, KeepsAndLeavesOutTheNamedGridsOfEachFrame) {
-  const auto run = convert({"--keep", "density", "--skip", "bool", "--skip", "points"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
-  EXPECT_THAT(run.out,
-              AllOf(HasSubstr("bool: left out in 3 frames, because --skip names it"),
-                    HasSubstr("density: carried unchanged in 3 frames, because --keep names it"),
-                    HasSubstr("int32: carried unchanged in 3 frames, because its values")));
-  ASSERT_EQ(convertBack("back.@.vdb").exitCode, 0);
+  EXPECT_THAT(succeeded(convert("--keep density --skip bool --skip points")).out,
+              Says("bool: left out in 3 frames, because --skip names it",
+                   "density: carried unchanged in 3 frames, because --keep names it",
+                   "int32: carried unchanged in 3 frames, because its values"));
+  succeeded(convertBack("back.@.vdb"));
   for (int frame = 1; frame <= 3; ++frame) {
     EXPECT_THAT(namesIn(back(frame)), ElementsAre("int32", "vec3s", "density"));
     EXPECT_EQ(bytesIn(back(frame)), bytesIn(in(frame), {1, 2, 4}));
@@ -403,17 +347,15 @@ TEST_F(CarriedSequence, KeepsAndLeavesOutTheNamedGridsOfEachFrame) {
 }
 
 TEST_F(CarriedSequence, WarnsOnceWhereNoFrameHasAFittedGrid) {
-  const auto run = convert({"--keep", "density"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(convert("--keep density"));
   EXPECT_EQ(timesIn(run.err, "warning"), 1u) << run.err;
   EXPECT_THAT(run.err, HasSubstr("warning: frames 1-3: no grid is fitted"));
   EXPECT_THAT(run.out, HasSubstr("bytes, 1 : ")) << "carried grids count";
-  EXPECT_EQ(convert({"--keep", "density", "--quiet", "-f"}).err, "");
+  EXPECT_EQ(convert("--keep density --quiet -f").err, "");
 }
 
 TEST_F(CarriedSequence, HasCarriedGridsInTheReportOfEachFrame) {
-  const auto run = convert({"--report", "-", "--skip", "bool"});
-  ASSERT_EQ(run.exitCode, 0) << run.err;
+  const auto run = succeeded(convert("--report - --skip bool"));
   const Json report = Json::parse(run.out);
   EXPECT_EQ(report["asked"]["skip"], Json::array({"bool"}));
   for (int frame = 1; frame <= 3; ++frame) {
@@ -427,25 +369,21 @@ TEST_F(CarriedSequence, HasCarriedGridsInTheReportOfEachFrame) {
 }
 
 TEST_F(CarriedSequence, FailsInFramesWithoutANamedGridOnly) {
-  test::writeInput(in(2), {{.voxels = test::softBall({})}});
-  const auto run = convert({"--keep", "vec3s"});
-  EXPECT_EQ(run.exitCode, 3);
-  EXPECT_THAT(run.err, AllOf(HasSubstr("frame 2: "), HasSubstr("no grid \"vec3s\""),
-                             HasSubstr("1 of 3 frames failed: 2")));
+  writeInput(in(2), {{.voxels = softBall({})}});
+  EXPECT_THAT(convert("--keep vec3s"),
+              Fails(3, "frame 2: ", "no grid \"vec3s\"", "1 of 3 frames failed: 2"));
   EXPECT_EQ(readEsvr(out(3)).carried.size(), 4u);
 }
 
 TEST_F(CarriedSequence, WarnsOnceOfGridsThatTheOutputCannotHold) {
-  ASSERT_EQ(convert().exitCode, 0);
-  const auto nano = convertBack("back.@.nvdb");
-  EXPECT_EQ(nano.exitCode, 0) << nano.err;
+  succeeded(convert());
+  const auto nano = succeeded(convertBack("back.@.nvdb"));
   EXPECT_EQ(timesIn(nano.err, "grid \"vec3s\" is left out"), 1u) << nano.err;
-  EXPECT_THAT(nano.err, AllOf(HasSubstr("warning: frames 1-3: grid \"vec3s\" is left out"),
-                              HasSubstr("frames 1-3: a NanoVDB file holds no metadata"),
-                              Not(HasSubstr("back.1.nvdb"))));
-  const auto named = convertBack("no.@.nvdb", {"-g", "vec3s"});
-  EXPECT_EQ(named.exitCode, 2);
-  EXPECT_THAT(named.err, HasSubstr("no.1.nvdb: grid \"vec3s\" cannot be written"));
+  EXPECT_THAT(nano.err,
+              Says("warning: frames 1-3: grid \"vec3s\" is left out",
+                   "frames 1-3: a NanoVDB file holds no metadata", Not(HasSubstr("back.1.nvdb"))));
+  EXPECT_THAT(convertBack("no.@.nvdb", "-g vec3s"),
+              Fails(2, "no.1.nvdb: grid \"vec3s\" cannot be written"));
 }
 
 TEST_F(CarriedSequence, OfLargeCarriedGridsIsConvertedOneByOneWhereMemoryIsShort) {
@@ -460,4 +398,4 @@ TEST_F(CarriedSequence, OfLargeCarriedGridsIsConvertedOneByOneWhereMemoryIsShort
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

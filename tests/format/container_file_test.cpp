@@ -5,86 +5,73 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <fstream>
-
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "format/crafted_file.h"
 #include "format/sample_files.h"
 #include "support/file_size_limit.h"
+#include "support/messages.h"
 #include "support/temporary_folder.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AllOf;
-using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::ThrowsMessage;
 
 class ContainerFile : public testing::Test {
  protected:
   [[nodiscard]] fs::path path() const { return folder_ / "f.esvr"; }
-  void put(const std::vector<std::byte>& bytes) const {
-    std::ofstream out(path(), std::ios::binary);
-    out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
-  }
-  void put(const std::string& text) const { put(test::bytesOf(text)); }
+  void put(const std::vector<std::byte>& bytes) const { writeBytes(path(), bytes); }
+  void put(const std::string& text) const { put(bytesOf(text)); }
 
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(ContainerFile, ComesBackAndHasTheSizeThatWasSaid) {
-  const EsvrFile file = test::everything(100);
+  const EsvrFile file = everything(100);
   const std::uint64_t written = writeEsvr(path(), file);
   EXPECT_EQ(written, fs::file_size(path()));
-  EXPECT_EQ(test::difference(readEsvr(path()), file), "");
+  EXPECT_EQ(difference(readEsvr(path()), file), "");
 }
 
 TEST_F(ContainerFile, AnExistingOneIsReplacedOnlyWhenAsked) {
   put("precious");
-  const EsvrFile file = test::everything(1);
-  EXPECT_THAT([&] { writeEsvr(path(), file); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("exists already")));
+  const EsvrFile file = everything(1);
+  EXPECT_THAT([&] { writeEsvr(path(), file); }, ThrowsSaying<RuntimeFailure>("exists already"));
   EXPECT_EQ(fs::file_size(path()), 8u);
   writeEsvr(path(), file, {.overwrite = true});
-  EXPECT_EQ(test::difference(readEsvr(path()), file), "");
+  EXPECT_EQ(difference(readEsvr(path()), file), "");
 }
 
 TEST_F(ContainerFile, AFullDiskLeavesNothing) {
   {
-    const test::FileSizeLimit limit(1000);
-    EXPECT_THAT([&] { writeEsvr(path(), test::everything(100)); },
-                ThrowsMessage<RuntimeFailure>(HasSubstr("f.esvr")));
+    const FileSizeLimit limit(1000);
+    EXPECT_THAT([&] { writeEsvr(path(), everything(100)); },
+                ThrowsSaying<RuntimeFailure>("f.esvr"));
   }
   EXPECT_THAT(folder_.names(), IsEmpty());
 }
 
 TEST_F(ContainerFile, WhatCannotBeStoredIsNamedAndLeavesNothing) {
-  StoredGrid grid = test::fogGrid(4);
+  StoredGrid grid = fogGrid(4);
   grid.field.chunks[0].ellipsoids.intensity[2] = std::numeric_limits<float>::infinity();
-  EXPECT_THAT([&] { writeEsvr(path(), test::fileOf(grid)); },
-              ThrowsMessage<RuntimeFailure>(
-                  AllOf(HasSubstr("'density'"), HasSubstr("intensity of ellipsoid 2"))));
+  EXPECT_THAT([&] { writeEsvr(path(), fileOf(grid)); },
+              ThrowsSaying<RuntimeFailure>("'density'", "intensity of ellipsoid 2"));
   EXPECT_THAT(folder_.names(), IsEmpty());
 }
 
 TEST_F(ContainerFile, OtherThingsAreRefusedByName) {
-  EXPECT_THAT([&] { (void)readEsvr(path()); },
-              ThrowsMessage<BadInput>(HasSubstr("f.esvr: No such file")));
+  EXPECT_THAT([&] { (void)readEsvr(path()); }, ThrowsSaying<BadInput>("f.esvr: No such file"));
   EXPECT_THAT([&] { (void)readEsvr(folder_.path()); },
-              ThrowsMessage<BadInput>(HasSubstr("not a regular file")));
-  EXPECT_THAT([&] { (void)readEsvr("/dev/zero"); },
-              ThrowsMessage<BadInput>(HasSubstr("not a regular file")));
+              ThrowsSaying<BadInput>("not a regular file"));
+  EXPECT_THAT([&] { (void)readEsvr("/dev/zero"); }, ThrowsSaying<BadInput>("not a regular file"));
   put("");
-  EXPECT_THAT([&] { (void)readEsvr(path()); },
-              ThrowsMessage<BadInput>(HasSubstr("not an .esvr file")));
+  EXPECT_THAT([&] { (void)readEsvr(path()); }, ThrowsSaying<BadInput>("not an .esvr file"));
   put("a text of more than a few words, but still a text");
-  EXPECT_THAT([&] { (void)inspectEsvr(path()); },
-              ThrowsMessage<BadInput>(HasSubstr("not an .esvr file")));
+  EXPECT_THAT([&] { (void)inspectEsvr(path()); }, ThrowsSaying<BadInput>("not an .esvr file"));
 }
 
 TEST_F(ContainerFile, APipeIsRefusedWithoutWaiting) {
@@ -93,7 +80,7 @@ TEST_F(ContainerFile, APipeIsRefusedWithoutWaiting) {
 }
 
 TEST_F(ContainerFile, InspectionListsTheSections) {
-  writeEsvr(path(), test::fileOf(test::chunkedGrid(50)));
+  writeEsvr(path(), fileOf(chunkedGrid(50)));
   const EsvrSummary summary = inspectEsvr(path());
   EXPECT_EQ(summary.versionMajor, kFormatVersion);
   EXPECT_EQ(summary.fileBytes, fs::file_size(path()));
@@ -108,8 +95,8 @@ TEST_F(ContainerFile, InspectionListsTheSections) {
 constexpr auto kUnknownKindOfSection = format::SectionKind(0x1234);
 
 TEST_F(ContainerFile, InspectionNamesWhatItDoesNotKnow) {
-  test::CraftedFile crafted(encodeEsvr({}));
-  crafted.add({kUnknownKindOfSection}, 0, test::bytesOf("?"));
+  CraftedFile crafted(encodeEsvr({}));
+  crafted.add({kUnknownKindOfSection}, 0, bytesOf("?"));
   put(crafted.assemble());
   const EsvrSummary summary = inspectEsvr(path());
   ASSERT_EQ(summary.sections.size(), 1u);
@@ -118,7 +105,7 @@ TEST_F(ContainerFile, InspectionNamesWhatItDoesNotKnow) {
 }
 
 TEST_F(ContainerFile, InspectionDoesNotReadTheSections) {
-  test::CraftedFile crafted(encodeEsvr(test::everything(10)));
+  CraftedFile crafted(encodeEsvr(everything(10)));
   auto bytes = crafted.assemble();
   bytes.back() ^= std::byte{1};
   put(bytes);
@@ -135,7 +122,7 @@ StoredGrid withMap(StoredGrid grid, std::size_t bytes) {
 }
 
 TEST_F(ContainerFile, CheckHasNothingToSayOfAGoodFile) {
-  writeEsvr(path(), test::fileOf(withMap(test::fogGrid(100), kUniformMapBytes)));
+  writeEsvr(path(), fileOf(withMap(fogGrid(100), kUniformMapBytes)));
   EXPECT_THAT(checkEsvr(path()), IsEmpty());
 }
 
@@ -143,19 +130,19 @@ TEST_F(ContainerFile, CheckRefusesATransformThatIsTooShortOrTooLong) {
   for (const std::size_t bytes : {std::size_t{0}, kUniformMapBytes - 1, kUniformMapBytes + 1}) {
     const fs::path file = path();
     fs::remove(file);
-    writeEsvr(file, test::fileOf(withMap(test::fogGrid(100), bytes)));
+    writeEsvr(file, fileOf(withMap(fogGrid(100), bytes)));
     EXPECT_NO_THROW((void)readEsvr(file)) << "voxels need no transform";
     EXPECT_THAT([&] { (void)checkEsvr(file); },
-                ThrowsMessage<BadInput>(HasSubstr("not a map of type UniformScaleMap")));
+                ThrowsSaying<BadInput>("not a map of type UniformScaleMap"));
   }
 }
 
 TEST_F(ContainerFile, CheckNotesWhatAReaderPassesOver) {
-  StoredGrid odd = withMap(test::emptyGrid(), kUniformMapBytes);
+  StoredGrid odd = withMap(emptyGrid(), kUniformMapBytes);
   odd.field.background = 2.0f;
-  test::CraftedFile crafted(encodeEsvr(test::fileOf(odd)));
+  CraftedFile crafted(encodeEsvr(fileOf(odd)));
   crafted.versionMinor = 7;
-  crafted.add({kUnknownKindOfSection, 0}, 0, test::bytesOf("?"));
+  crafted.add({kUnknownKindOfSection, 0}, 0, bytesOf("?"));
   put(crafted.assemble());
   EXPECT_THAT(checkEsvr(path()),
               ElementsAre(HasSubstr("format 1.7"), HasSubstr("unknown 0x1234 of grid 0, 1 bytes"),
@@ -163,11 +150,11 @@ TEST_F(ContainerFile, CheckNotesWhatAReaderPassesOver) {
 }
 
 TEST_F(ContainerFile, CheckThrowsForADamagedFile) {
-  auto bytes = encodeEsvr(test::fileOf(test::fogGrid(100)));
+  auto bytes = encodeEsvr(fileOf(fogGrid(100)));
   bytes.back() ^= std::byte{1};
   put(bytes);
-  EXPECT_THAT([&] { (void)checkEsvr(path()); }, ThrowsMessage<BadInput>(HasSubstr("checksum")));
+  EXPECT_THAT([&] { (void)checkEsvr(path()); }, ThrowsSaying<BadInput>("checksum"));
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -18,28 +18,19 @@
 #include "support/temporary_folder.h"
 #include "support/trials.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
 
-bool refused(const Bytes& bytes) {
-  try {
-    (void)decodeEsvr(bytes, "damaged");
-    return false;
-  } catch (const BadInput&) {
-    return true;
-  }
-}
-
 /// A file with all kinds of sections and padding between them, small enough to damage every byte.
-EsvrFile smallFile() { return test::everything(3); }
+EsvrFile smallFile() { return everything(3); }
 
 TEST(Damage, TruncationAtEveryByteIsRefused) {
   const Bytes whole = encodeEsvr(smallFile());
-  ASSERT_FALSE(refused(whole));
+  ASSERT_FALSE(isRefused(whole));
   for (std::size_t n = 0; n < whole.size(); ++n)
-    EXPECT_TRUE(refused({whole.begin(), whole.begin() + std::ptrdiff_t(n)})) << n;
+    EXPECT_TRUE(isRefused({whole.begin(), whole.begin() + std::ptrdiff_t(n)})) << n;
 }
 
 TEST(Damage, SlowAnyBitFlippedIsRefused) {
@@ -50,7 +41,7 @@ TEST(Damage, SlowAnyBitFlippedIsRefused) {
     for (int bit = 0; bit < 8; ++bit) {
       if (i >= kHead && bit != int(i % 8)) continue;
       bytes[i] ^= std::byte(1 << bit);
-      EXPECT_TRUE(refused(bytes)) << "byte " << i << ", bit " << bit;
+      EXPECT_TRUE(isRefused(bytes)) << "byte " << i << ", bit " << bit;
       bytes[i] ^= std::byte(1 << bit);
     }
 }
@@ -58,7 +49,7 @@ TEST(Damage, SlowAnyBitFlippedIsRefused) {
 TEST(Damage, BytesAfterTheEndAreRefused) {
   Bytes bytes = encodeEsvr(smallFile());
   bytes.push_back({});
-  EXPECT_TRUE(refused(bytes));
+  EXPECT_TRUE(isRefused(bytes));
 }
 
 /// Applies one to eight of these: changes a byte, cuts a run out, repeats a run elsewhere, reverses
@@ -107,7 +98,7 @@ TEST(Damage, TenThousandMutationsAreRefusedOrChangeNothing) {
   for (int i = 0; i < 10'000; ++i) {
     const Bytes bytes = mutator.mutated(whole);
     try {
-      EXPECT_EQ(test::difference(decodeEsvr(bytes, "mutated"), original), "") << i;
+      EXPECT_EQ(difference(decodeEsvr(bytes, "mutated"), original), "") << i;
       ++accepted;
     } catch (const BadInput&) {
     }
@@ -117,13 +108,10 @@ TEST(Damage, TenThousandMutationsAreRefusedOrChangeNothing) {
 
 // ---- Sequences
 
-using test::bytesIn;
-using test::sampleFrame;
-
 class SequenceDamage : public testing::Test {
  protected:
   SequenceDamage() {
-    test::writeChains(path(), {{1, 2, 3}, {5, 6}});
+    writeChains(path(), {{1, 2, 3}, {5, 6}});
     whole_ = bytesIn(path());
     frames_ = SequenceReader(path()).frames();
   }
@@ -131,7 +119,7 @@ class SequenceDamage : public testing::Test {
   void damage(std::size_t at) const {
     Bytes bytes = whole_;
     bytes[at] ^= std::byte{0x10};
-    test::writeBytes(path(), bytes);
+    writeBytes(path(), bytes);
   }
   /// The index of the frame that has a byte; the number of frames if none has it.
   [[nodiscard]] std::size_t frameAt(std::size_t at) const {
@@ -146,12 +134,12 @@ class SequenceDamage : public testing::Test {
            frames_[frame].group == frames_[damaged].group;
   }
   static bool canRead(SequenceReader& reader, std::int64_t number) try {
-    return test::difference(reader.read(number), sampleFrame(number)).empty();
+    return difference(reader.read(number), sampleFrame(number)).empty();
   } catch (const BadInput&) {
     return false;
   }
 
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
   Bytes whole_;
   std::vector<SequenceFrame> frames_;
 };
@@ -165,7 +153,7 @@ bool isFound(const std::filesystem::path& path) try {
 
 TEST_F(SequenceDamage, IsFoundAnywhere) {
   EXPECT_FALSE(isFound(path()));
-  for (std::size_t at = 0; at < whole_.size(); at += test::stride(3)) {
+  for (std::size_t at = 0; at < whole_.size(); at += stride(3)) {
     damage(at);
     EXPECT_TRUE(isFound(path())) << at;
   }
@@ -173,7 +161,7 @@ TEST_F(SequenceDamage, IsFoundAnywhere) {
 
 TEST_F(SequenceDamage, LosesNoOtherFrames) {
   const std::size_t end = frames_.back().offset + frames_.back().bytes;
-  for (std::size_t at = frames_.front().offset; at < end; at += test::stride(3)) {
+  for (std::size_t at = frames_.front().offset; at < end; at += stride(3)) {
     damage(at);
     SequenceReader reader(path());
     for (std::size_t i = 0; i < frames_.size(); ++i)
@@ -191,7 +179,7 @@ TEST_F(SequenceDamage, IsToldForEachFrameThatIsLost) {
 
 TEST_F(SequenceDamage, IsTruncationAnywhere) {
   for (std::size_t n = 0; n < whole_.size(); n += 1 + (whole_.size() - 1 - n) / 16) {
-    test::writeBytes(path(), {whole_.begin(), whole_.begin() + std::ptrdiff_t(n)});
+    writeBytes(path(), {whole_.begin(), whole_.begin() + std::ptrdiff_t(n)});
     EXPECT_THROW(SequenceReader{path()}, BadInput) << n;
   }
 }
@@ -207,10 +195,10 @@ TEST_F(SequenceDamage, OfAPartialFileRemovesTheGroupAndThoseAfterIt) {
   }
   Bytes bytes = bytesIn(SequenceWriter::partialPath(path()));
   bytes[bytes.size() / 4] ^= std::byte{1};
-  test::writeBytes(SequenceWriter::partialPath(path()), bytes);
+  writeBytes(SequenceWriter::partialPath(path()), bytes);
   const SequenceWriter writer(path(), {.partial = PartialSequence::kResume});
   EXPECT_EQ(writer.groupCount(), 0u);
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -5,25 +5,19 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 
 #include "esvr/container.h"
 #include "format/sample_files.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 namespace fs = std::filesystem;
 
 const fs::path kFolder = ESVR_GOLDEN_DIR;
 
-std::vector<std::byte> contentOf(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return test::bytesOf(std::string(std::istreambuf_iterator<char>(in), {}));
-}
-std::vector<std::byte> contentOf(const test::GoldenFile& golden) {
-  return contentOf(kFolder / (golden.name + ".esvr"));
+std::vector<std::byte> contentOf(const GoldenFile& golden) {
+  return bytesIn(kFolder / (golden.name + ".esvr"));
 }
 
 TEST(GoldenFiles, AllInTheFolderAreSmallAndKnown) {
@@ -32,13 +26,13 @@ TEST(GoldenFiles, AllInTheFolderAreSmallAndKnown) {
     found.push_back(entry.path().filename().string());
     EXPECT_LT(entry.file_size(), 4096u) << entry.path();
   }
-  for (const auto& golden : test::goldenFiles()) known.push_back(golden.name + ".esvr");
+  for (const auto& golden : goldenFiles()) known.push_back(golden.name + ".esvr");
   EXPECT_THAT(found, testing::UnorderedElementsAreArray(known));
 }
 
 TEST(GoldenFiles, DecodeToTheirContent) {
-  for (const auto& golden : test::goldenFiles())
-    EXPECT_EQ(test::difference(decodeEsvr(contentOf(golden), golden.name), golden.content), "")
+  for (const auto& golden : goldenFiles())
+    EXPECT_EQ(difference(decodeEsvr(contentOf(golden), golden.name), golden.content), "")
         << golden.name;
 }
 
@@ -59,9 +53,9 @@ TEST(GoldenFiles, OneEllipsoidDecodesToTheNumbersTyped) {
 }
 
 TEST(GoldenFiles, AreWrittenByteForByte) {
-  for (const auto& golden : test::goldenFiles())
-    EXPECT_EQ(test::bytesOf(golden), contentOf(golden)) << golden.name;
+  for (const auto& golden : goldenFiles())
+    EXPECT_EQ(bytesOf(golden), contentOf(golden)) << golden.name;
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -19,7 +19,7 @@
 #include "esvr/metrics.h"
 #include "field/random_field.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 GridDescriptor descriptorOf(GridClass gridClass, double background) {
@@ -33,14 +33,14 @@ const GridDescriptor kFog = descriptorOf(GridClass::kFogVolume, 0.0);
 const GridDescriptor kLevelSet = descriptorOf(GridClass::kLevelSet, 3.0);
 
 Field positiveField(std::uint64_t seed, Coord origin = {}) {
-  Field field = test::randomField({.count = 20, .extent = 30.0, .origin = origin, .seed = seed});
+  Field field = randomField({.count = 20, .extent = 30.0, .origin = origin, .seed = seed});
   for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i) + 0.1f;
   return field;
 }
 
 /// A field that differs from the one of the source, for an overlap below 1.
 Field perturbed(Field field) {
-  test::Random random(11);
+  Random random(11);
   for (float& x : field.chunks[0].ellipsoids.center[0]) x += float(random(-1.0, 1.0));
   return field;
 }
@@ -151,7 +151,7 @@ TEST(GridCoding, TheThresholdIsTheSameElsewhereAndScalesWithTheValues) {
 }
 
 TEST(GridCoding, NegativeValuesComeBackOnlyWhereTheSourceHadThem) {
-  const Field field = test::randomField({.count = 20, .extent = 30.0});
+  const Field field = randomField({.count = 20, .extent = 30.0});
   const SparseVolume withNegative = revoxelise(field, {});
   const SparseVolume without = revoxelise(field, {.range = ValueRange{0.0f, 1e6f}});
   ASSERT_LT(activeRange(withNegative).min, 0.0f);
@@ -394,7 +394,7 @@ TEST(GridCoding, TheRuleOfTheVoxelsIsWhatDecodingGoesBy) {
     expectDecoded(positiveField(seed), Activity::kByValue, TopologyKind::kThreshold);
     expectDecoded(positiveField(seed), Activity::kExact, TopologyKind::kMask);
   }
-  expectDecoded(test::randomField({.count = 20, .extent = 30.0}), Activity::kByValue,
+  expectDecoded(randomField({.count = 20, .extent = 30.0}), Activity::kByValue,
                 TopologyKind::kThreshold);
   const StoredGrid band = makeStoredGrid(
       kLevelSet, revoxelise(ball(), {.threshold = 0.01f, .narrowBand = true}), ball());
@@ -419,4 +419,4 @@ TEST(GridCoding, ASourceWithoutActiveVoxelsIsRefused) {
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -2,7 +2,6 @@
 // only, because existing ones must not change within a version of the format.
 
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 
 #include "format/sample_files.h"
@@ -12,11 +11,8 @@ int main(int argc, char** argv) {
     std::cerr << "usage: make_golden FOLDER SEQUENCE.esvr\n";
     return 2;
   }
-  for (const auto& golden : esvr::test::goldenFiles()) {
-    const auto bytes = esvr::test::bytesOf(golden);
-    std::ofstream out(std::filesystem::path(argv[1]) / (golden.name + ".esvr"), std::ios::binary);
-    out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
-    if (!out.flush()) return 1;
-  }
+  for (const auto& golden : esvr::test::goldenFiles())
+    esvr::test::writeBytes(std::filesystem::path(argv[1]) / (golden.name + ".esvr"),
+                           esvr::test::bytesOf(golden));
   esvr::test::writeGoldenSequence(argv[2]);
 }

@@ -11,10 +11,8 @@
 #include "esvr/error.h"
 #include "format/sample_files.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
-
-using test::difference;
 
 EsvrFile roundTrip(const EsvrFile& file) { return decodeEsvr(encodeEsvr(file), "memory"); }
 
@@ -28,18 +26,12 @@ void swapEllipsoids(Ellipsoids& e, std::size_t i, std::size_t j) {
 }
 
 TEST(RoundTrip, EveryPartComesBack) {
-  for (const std::size_t n : {1u, 7u, 5000u}) {
-    const EsvrFile file = test::everything(n);
-    EXPECT_EQ(difference(roundTrip(file), file), "") << n;
-  }
+  for (const std::size_t n : {1u, 7u, 5000u}) EXPECT_EQ(lossOf(everything(n)), "") << n;
 }
 
-TEST(RoundTrip, AFileWithoutGrids) { EXPECT_EQ(difference(roundTrip({}), {}), ""); }
+TEST(RoundTrip, AFileWithoutGrids) { EXPECT_EQ(lossOf({}), ""); }
 
-TEST(RoundTrip, AGridWithoutEllipsoids) {
-  const EsvrFile file = test::fileOf(test::emptyGrid());
-  EXPECT_EQ(difference(roundTrip(file), file), "");
-}
+TEST(RoundTrip, AGridWithoutEllipsoids) { EXPECT_EQ(lossOf(fileOf(emptyGrid())), ""); }
 
 TEST(RoundTrip, AnyFiniteFloat) {
   using Limits = std::numeric_limits<float>;
@@ -47,16 +39,16 @@ TEST(RoundTrip, AnyFiniteFloat) {
                             Limits::min(), -Limits::min(), -Limits::denorm_min(),
                             Limits::max(), -Limits::max(), std::nextafter(1.0f, 2.0f)};
   const std::size_t n = std::size(extremes);
-  Ellipsoids e = test::sampleEllipsoids(n, 1, {.kappas = true});
+  Ellipsoids e = sampleEllipsoids(n, 1, {.kappas = true});
   for (std::size_t i = 0; i < n; ++i) {
     for (auto& scale : e.logScale) scale[i] = std::clamp(extremes[i], -kMaxLogScale, kMaxLogScale);
     e.intensity[i] = e.kappa[i] = extremes[i];
     e.center[0][i] = extremes[(i + 3) % n];
   }
-  StoredGrid grid = test::emptyGrid();
+  StoredGrid grid = emptyGrid();
   grid.field.chunks = {{{}, e}};
-  const EsvrFile once = roundTrip(test::fileOf(grid));
-  EXPECT_EQ(difference(roundTrip(once), once), "");
+  const EsvrFile once = roundTrip(fileOf(grid));
+  EXPECT_EQ(lossOf(once), "");
 
   const auto sortedBits = [](std::vector<float> v) {
     std::sort(v.begin(), v.end(), [](float a, float b) {
@@ -73,74 +65,70 @@ TEST(RoundTrip, AnyFiniteFloat) {
 }
 
 TEST(RoundTrip, NegativeZeroInARotationIsNotTheIdentity) {
-  StoredGrid grid = test::levelSetGrid(3);
+  StoredGrid grid = levelSetGrid(3);
   grid.field.chunks[0].ellipsoids.rotation[2][1] = -0.0f;
-  const EsvrFile file = test::fileOf(grid);
-  EXPECT_EQ(difference(roundTrip(file), file), "");
+  EXPECT_EQ(lossOf(fileOf(grid)), "");
 }
 
 TEST(RoundTrip, StringsAreBytes) {
-  StoredGrid grid = test::fogGrid(2);
+  StoredGrid grid = fogGrid(2);
   grid.descriptor.name = std::string(
       "nul \0 and Gr\xc3\xb6\xc3\x9f"
       "e",
       16);
   grid.descriptor.metadata.push_back({std::string("\0", 1), "", {}});
-  const EsvrFile file = test::fileOf(grid);
-  EXPECT_EQ(difference(roundTrip(file), file), "");
+  EXPECT_EQ(lossOf(fileOf(grid)), "");
 }
 
 TEST(RoundTrip, HugeMetadata) {
   std::vector<std::byte> noise(1'000'000);
   std::uint32_t state = 1;
   for (auto& b : noise) b = std::byte((state = state * 1664525u + 1013904223u) >> 24);
-  EsvrFile file = test::fileOf(test::fogGrid(2));
+  EsvrFile file = fileOf(fogGrid(2));
   file.metadata = {{"noise", "blob", noise},
                    {"zeros", "string", std::vector<std::byte>(5'000'000)}};
-  EXPECT_EQ(difference(roundTrip(file), file), "");
+  EXPECT_EQ(lossOf(file), "");
 }
 
 TEST(RoundTrip, EqualEllipsoidsCompressToTheirBoundAndComeBack) {
-  StoredGrid grid = test::emptyGrid();
+  StoredGrid grid = emptyGrid();
   Ellipsoids e;
   e.resize(200'000);
   std::fill(e.rotation[0].begin(), e.rotation[0].end(), 1.0f);
   grid.field.chunks = {{{}, e}};
-  const EsvrFile file = test::fileOf(grid);
-  EXPECT_EQ(difference(roundTrip(file), file), "");
+  EXPECT_EQ(lossOf(fileOf(grid)), "");
 }
 
 TEST(RoundTrip, APerfectFitHasAnInfinitePsnr) {
-  StoredGrid grid = test::fogGrid(2);
+  StoredGrid grid = fogGrid(2);
   grid.curve[1].psnrBox = std::numeric_limits<double>::infinity();
-  const EsvrFile file = test::fileOf(grid);
-  EXPECT_EQ(difference(roundTrip(file), file), "");
+  EXPECT_EQ(lossOf(fileOf(grid)), "");
 }
 
 TEST(RoundTrip, TheOrderInTheFileDoesNotDependOnTheOrderGiven) {
-  StoredGrid grid = test::chunkedGrid(100);
-  const auto bytes = encodeEsvr(test::fileOf(grid));
+  StoredGrid grid = chunkedGrid(100);
+  const auto bytes = encodeEsvr(fileOf(grid));
   for (std::size_t i = 0; i < 50; ++i) {
     swapEllipsoids(grid.field.chunks[0].ellipsoids, i, 99 - i);
     swapEllipsoids(grid.field.chunks[2].ellipsoids, i, (i * 7) % 100);
   }
-  EXPECT_EQ(encodeEsvr(test::fileOf(grid)), bytes);
+  EXPECT_EQ(encodeEsvr(fileOf(grid)), bytes);
 }
 
 TEST(RoundTrip, EncodingAgainGivesTheSameBytes) {
-  const auto bytes = encodeEsvr(test::everything(3000));
-  EXPECT_EQ(encodeEsvr(test::everything(3000)), bytes);
+  const auto bytes = encodeEsvr(everything(3000));
+  EXPECT_EQ(encodeEsvr(everything(3000)), bytes);
   EXPECT_EQ(encodeEsvr(decodeEsvr(bytes, "memory")), bytes);
 }
 
 TEST(RoundTrip, AFarBackgroundRaisesTheVersionAndComesBack) {
   const auto minorVersionOf = [](const std::vector<std::byte>& bytes) { return int(bytes[10]); };
-  StoredGrid grid = test::fogGrid(7);
-  EXPECT_LT(minorVersionOf(encodeEsvr(test::fileOf(grid))), 5);
+  StoredGrid grid = fogGrid(7);
+  EXPECT_LT(minorVersionOf(encodeEsvr(fileOf(grid))), 5);
   grid.farBackground = true;
   grid.topology = TopologyKind::kThreshold;
   grid.field.background = 300.0f;
-  EsvrFile file = test::fileOf(grid);
+  EsvrFile file = fileOf(grid);
   for (const auto layout : {FileLayout::kPlain, FileLayout::kCompact}) {
     file.layout = layout;
     const auto bytes = encodeEsvr(file);
@@ -152,10 +140,10 @@ TEST(RoundTrip, AFarBackgroundRaisesTheVersionAndComesBack) {
 }
 
 TEST(RoundTrip, AToneCurveRaisesTheVersionAndComesBack) {
-  StoredGrid grid = test::fogGrid(7);
+  StoredGrid grid = fogGrid(7);
   grid.tone.scale = 0.25f;
   grid.withinRange = true;
-  EsvrFile file = test::fileOf(grid);
+  EsvrFile file = fileOf(grid);
   for (const auto layout : {FileLayout::kPlain, FileLayout::kCompact}) {
     file.layout = layout;
     const auto bytes = encodeEsvr(file);
@@ -168,11 +156,11 @@ TEST(RoundTrip, AToneCurveRaisesTheVersionAndComesBack) {
 
 TEST(RoundTrip, AToneCurveThatHasNoMeaningIsRefused) {
   const auto refuses = [](const auto& spoil) {
-    StoredGrid grid = test::fogGrid(7);
+    StoredGrid grid = fogGrid(7);
     grid.tone.scale = 0.25f;
     grid.withinRange = true;
     spoil(grid);
-    EXPECT_THROW((void)encodeEsvr(test::fileOf(grid)), RuntimeFailure);
+    EXPECT_THROW((void)encodeEsvr(fileOf(grid)), RuntimeFailure);
   };
   refuses([](StoredGrid& grid) { grid.tone.scale = -1.0f; });
   refuses([](StoredGrid& grid) { grid.tone.scale = NAN; });
@@ -183,10 +171,10 @@ TEST(RoundTrip, AToneCurveThatHasNoMeaningIsRefused) {
 }
 
 TEST(RoundTrip, AFarBackgroundOfBricksIsRefused) {
-  StoredGrid grid = test::levelSetGrid(7);
+  StoredGrid grid = levelSetGrid(7);
   grid.farBackground = true;
-  EXPECT_THROW((void)encodeEsvr(test::fileOf(grid)), RuntimeFailure);
+  EXPECT_THROW((void)encodeEsvr(fileOf(grid)), RuntimeFailure);
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

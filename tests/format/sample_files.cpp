@@ -9,6 +9,7 @@
 #include <iterator>
 #include <random>
 
+#include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
 #include "format/bytes.h"
@@ -63,7 +64,7 @@ bool sameBits(const std::array<std::vector<float>, N>& a,
   return true;
 }
 
-std::string difference(const Ellipsoids& a, const Ellipsoids& b) {
+std::string differenceOf(const Ellipsoids& a, const Ellipsoids& b) {
   if (!sameBits(a.center, b.center)) return "centers";
   if (!sameBits(a.logScale, b.logScale)) return "scales";
   if (!sameBits(a.rotation, b.rotation)) return "rotations";
@@ -72,19 +73,19 @@ std::string difference(const Ellipsoids& a, const Ellipsoids& b) {
   return "";
 }
 
-std::string difference(const Field& a, const Field& b) {
+std::string differenceOf(const Field& a, const Field& b) {
   if (!sameBits(a.background, b.background)) return "background of the field";
   if (!(a.kernel == b.kernel)) return "kernel";
   if (a.chunks.size() != b.chunks.size()) return "number of chunks";
   for (std::size_t c = 0; c < a.chunks.size(); ++c) {
     if (a.chunks[c].origin != b.chunks[c].origin) return "origin of a chunk";
-    const auto text = difference(a.chunks[c].ellipsoids, b.chunks[c].ellipsoids);
+    const auto text = differenceOf(a.chunks[c].ellipsoids, b.chunks[c].ellipsoids);
     if (!text.empty()) return text;
   }
   return "";
 }
 
-std::string difference(const StoredGrid& a, const StoredGrid& b) {
+std::string differenceOf(const StoredGrid& a, const StoredGrid& b) {
   if (!(a.descriptor == b.descriptor)) return "descriptor";
   if (!sameBits(a.descriptor.background, b.descriptor.background)) return "background";
   if (a.topology != b.topology || a.bricks != b.bricks || a.mask != b.mask) return "topology";
@@ -101,7 +102,7 @@ std::string difference(const StoredGrid& a, const StoredGrid& b) {
     return "voxels that are not finite";
   if (a.quantised != b.quantised) return "quantised";
   if (a.layerErrors != b.layerErrors) return "errors of layers";
-  return difference(a.field, b.field);
+  return differenceOf(a.field, b.field);
 }
 
 }  // namespace
@@ -187,7 +188,7 @@ std::vector<std::uint8_t> threeHighest(std::vector<std::uint8_t> precision) {
   return precision;
 }
 
-StoredGrid quantisedGrid(std::size_t ellipsoidsPerChunk, bool layered) {
+StoredGrid quantised(std::size_t ellipsoidsPerChunk, bool layered) {
   StoredGrid grid = emptyGrid();
   grid.descriptor.name = "compact";
   const std::vector<double> curvature(ellipsoidsPerChunk, 4.0);
@@ -209,11 +210,11 @@ StoredGrid quantisedGrid(std::size_t ellipsoidsPerChunk, bool layered) {
 }  // namespace
 
 StoredGrid quantisedGrid(std::size_t ellipsoidsPerChunk) {
-  return quantisedGrid(ellipsoidsPerChunk, false);
+  return quantised(ellipsoidsPerChunk, false);
 }
 
 StoredGrid layeredGrid(std::size_t ellipsoidsPerChunk) {
-  StoredGrid grid = quantisedGrid(ellipsoidsPerChunk, true);
+  StoredGrid grid = quantised(ellipsoidsPerChunk, true);
   for (std::size_t k = 0; layerCount(grid) > 1 && k < layerCount(grid); ++k)
     grid.layerErrors.push_back({20.0f + 5.0f * float(k), 1.0f / float(1 + k)});
   return grid;
@@ -256,13 +257,33 @@ std::string difference(const EsvrFile& a, const EsvrFile& b) {
   if (a.metadata != b.metadata) return "metadata";
   if (a.grids.size() != b.grids.size()) return "number of grids";
   for (std::size_t g = 0; g < a.grids.size(); ++g) {
-    const auto text = difference(a.grids[g], b.grids[g]);
+    const auto text = differenceOf(a.grids[g], b.grids[g]);
     if (!text.empty()) return "grid " + std::to_string(g) + ": " + text;
   }
   if (a.carried != b.carried) return "carried grids";
   if (a.vectors != b.vectors) return "vectors";
   return "";
 }
+
+std::string lossOf(const EsvrFile& file) {
+  return difference(decodeEsvr(encodeEsvr(file), "memory"), file);
+}
+
+std::string refusalToRead(const std::vector<std::byte>& bytes) try {
+  (void)decodeEsvr(bytes, "lie.esvr");
+  return "none";
+} catch (const BadInput& error) {
+  return error.what();
+}
+
+std::string refusalToWrite(const EsvrFile& file) try {
+  (void)encodeEsvr(file);
+  return "none";
+} catch (const RuntimeFailure& error) {
+  return error.what();
+}
+
+bool isRefused(const std::vector<std::byte>& bytes) { return refusalToRead(bytes) != "none"; }
 
 // ---- The golden files
 

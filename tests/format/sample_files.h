@@ -57,6 +57,14 @@ struct EllipsoidParts {
 /// differs, or ""
 [[nodiscard]] std::string difference(const EsvrFile& a, const EsvrFile& b);
 
+/// The difference between a file and what is read of its bytes.
+[[nodiscard]] std::string lossOf(const EsvrFile& file);
+
+/// The message with which a reader refuses the file "lie.esvr", and a writer a content; or "none".
+[[nodiscard]] std::string refusalToRead(const std::vector<std::byte>& bytes);
+[[nodiscard]] std::string refusalToWrite(const EsvrFile& file);
+[[nodiscard]] bool isRefused(const std::vector<std::byte>& bytes);
+
 // ---- The content of the files in tests/format/golden, and how this version of the format writes them
 
 struct GoldenFile {

@@ -1,8 +1,5 @@
-// Plan: integers of every length come back, in as many bytes as 7 bits a byte take. Integers of more
-// than 64 bits and truncated ones are refused.
-//
-// Content comes back from every codec that a section may have. Floats are smaller as such than as bytes. Sizes
-// that cannot be are refused before memory is allocated, and so are codecs that a kind of section cannot have.
+// Plan: integers of every length and content of every codec come back, in as many bytes as they should
+// take. Sizes and codecs that cannot be are refused before memory is allocated.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,12 +12,10 @@
 #include "esvr/error.h"
 #include "format/bytes.h"
 #include "format/section_table.h"
+#include "support/messages.h"
 
 namespace esvr::format {
 namespace {
-
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 // Bytes.
 
@@ -116,7 +111,7 @@ TEST(Codec, KnowsSizesThatCannotBe) {
 
 TEST(Codec, LeavesBloscToCarriedGrids) {
   EXPECT_THAT([] { (void)unpack(Codec::kBlosc, Bytes(100), 100, "place"); },
-              ThrowsMessage<BadInput>(HasSubstr("place: Blosc")));
+              test::ThrowsSaying<BadInput>("place: Blosc"));
 }
 
 }  // namespace

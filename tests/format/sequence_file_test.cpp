@@ -1,10 +1,6 @@
-// Plan: frames of every form of voxels come back bit for bit, and take no more bytes than files of
-// their own. Bricks appear and vanish between frames, origins and lattices change, and a frame is
-// empty. Coding twice gives the same bytes. A frame that is read without its predecessor, with
-// another one or with damage is refused.
-//
-// Small sequences are written, read in any order, and left incomplete at any byte. What a
-// reader gets must be what was written, with as few bytes read as the format promises.
+// Plan: frames of every form of voxels come back bit for bit, in any order, with as few bytes read as the
+// format promises, and take no more bytes than files of their own. Sequences are left incomplete at any
+// byte, and a frame without its predecessor, with another one or with damage is refused.
 
 #include "esvr/sequence_file.h"
 
@@ -23,14 +19,13 @@
 #include "esvr/grid_coding.h"
 #include "format/sample_files.h"
 #include "format/section_table.h"
+#include "support/messages.h"
 #include "support/temporary_folder.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 namespace fs = std::filesystem;
-using test::bytesIn;
-using test::sampleFrame;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -47,14 +42,14 @@ MetaItem creator(const std::string& name) {
 
 /// A ball that moves along z by a voxel a frame, with soft values in steps of 1/64.
 SparseVolume ballAt(double frame, int bricks = 4) {
-  return test::volumeOf({}, bricks, 0.0f, [&](Coord v) {
+  return volumeOf({}, bricks, 0.0f, [&](Coord v) {
     const double x = v.x - 14.0, y = v.y - 15.0, z = v.z - 12.0 - frame;
     const double value = 1.2 - std::sqrt(x * x + y * y + z * z) / 9.0;
     return float(std::floor(std::max(value, 0.0) * 64.0) / 64.0);
   });
 }
 
-EsvrFile fileOf(const SparseVolume& volume, VoxelLayer layer) {
+EsvrFile voxelFileOf(const SparseVolume& volume, VoxelLayer layer) {
   GridDescriptor descriptor;
   descriptor.name = "density";
   return {{}, {makeStoredVoxels(descriptor, volume, std::move(layer))}};
@@ -62,7 +57,7 @@ EsvrFile fileOf(const SparseVolume& volume, VoxelLayer layer) {
 
 EsvrFile boundedFile(double frame, double bound = 0.01) {
   const SparseVolume volume = ballAt(frame);
-  return fileOf(volume, boundedLayer(volume, bound, Activity::kByValue));
+  return voxelFileOf(volume, boundedLayer(volume, bound, Activity::kByValue));
 }
 
 void expectSame(const EsvrFile& a, const EsvrFile& b) {
@@ -83,7 +78,7 @@ std::vector<std::byte> expectComesBack(const EsvrFile& frame, const EsvrFile& pr
 std::vector<VoxelLayer> layersOfAllForms(double frame) {
   const SparseVolume palette = ballAt(frame);
   SparseVolume halves = palette, floats = palette;
-  test::Random random(3);
+  Random random(3);
   for (float& v : halves.values) v = float(std::floor(random(0.0, 8192.0)) / 4096.0);
   for (float& v : floats.values) v += 1e-4f * v * v;
   for (float& v : floats.values) v *= 1.0f + 1e-3f * float(random(0.0, 1.0));
@@ -96,7 +91,7 @@ TEST(FrameCoding, BringsBackEveryFormAfterEveryForm) {
   const SparseVolume volume = ballAt(1.0);
   for (const VoxelLayer& before : layersOfAllForms(0.0))
     for (const VoxelLayer& now : layersOfAllForms(1.0))
-      expectComesBack(fileOf(volume, now), fileOf(volume, before));
+      expectComesBack(voxelFileOf(volume, now), voxelFileOf(volume, before));
 }
 
 TEST(FrameCoding, SavesBytesOfASlowMotion) {
@@ -175,7 +170,7 @@ TEST(FrameCoding, BringsBackOtherBricksAndOrigins) {
   SparseVolume moved = large;
   moved.origin = {-16, 8, 24};
   const auto file = [](const SparseVolume& volume) {
-    return fileOf(volume, boundedLayer(volume, 0.01, Activity::kByValue));
+    return voxelFileOf(volume, boundedLayer(volume, 0.01, Activity::kByValue));
   };
   const std::array files{file(small), file(large), file(moved)};
   for (const EsvrFile& before : files)
@@ -227,11 +222,11 @@ TEST(FrameCoding, CountsTheBytesOfAGrid) {
 TEST(FrameCoding, RefusesAMissingPreviousFrame) {
   const EsvrFile previous = boundedFile(0.0), none;
   const auto bytes = encodeFrame(boundedFile(0.1), &previous);
-  EXPECT_THAT([&] { (void)decodeFrame(bytes, "f.esvr, frame 2", {}, nullptr); },
-              ThrowsMessage<BadInput>(
-                  HasSubstr("f.esvr, frame 2: it cannot be read without the frame before")));
+  EXPECT_THAT(
+      [&] { (void)decodeFrame(bytes, "f.esvr, frame 2", {}, nullptr); },
+      ThrowsSaying<BadInput>("f.esvr, frame 2: it cannot be read without the frame before"));
   EXPECT_THAT([&] { (void)decodeFrame(bytes, "f.esvr, frame 2", {}, &none); },
-              ThrowsMessage<BadInput>(HasSubstr("the frame before has only 0 grids")));
+              ThrowsSaying<BadInput>("the frame before has only 0 grids"));
 }
 
 /// With another previous frame, a reader gets other voxels or an error, but never fails otherwise.
@@ -260,7 +255,7 @@ class SequenceFile : public testing::Test {
   [[nodiscard]] fs::path path() const { return folder_ / "a.esvr"; }
   [[nodiscard]] fs::path partial() const { return SequenceWriter::partialPath(path()); }
   void expectFrame(SequenceReader& reader, std::int64_t number) const {
-    EXPECT_EQ(test::difference(reader.read(number), sampleFrame(number)), "") << number;
+    EXPECT_EQ(difference(reader.read(number), sampleFrame(number)), "") << number;
   }
   void append(SequenceWriter& writer, const std::vector<std::int64_t>& group) const {
     for (const std::int64_t number : group)
@@ -270,11 +265,11 @@ class SequenceFile : public testing::Test {
   static void expectRefused(const std::function<void()>& action, const char* words) {
     EXPECT_THAT(action, ThrowsMessage<Refused>(HasSubstr(words)));
   }
-  test::TemporaryFolder folder_;
+  TemporaryFolder folder_;
 };
 
 TEST_F(SequenceFile, GivesItsFramesInAnyOrder) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   EXPECT_THAT(folder_.names(), ElementsAre("a.esvr"));
   EXPECT_TRUE(holdsSequence(path()));
   SequenceReader reader(path());
@@ -292,19 +287,19 @@ TEST_F(SequenceFile, GivesItsFramesInAnyOrder) {
 }
 
 /// The bytes of some frames, by their indices.
-std::uint64_t bytesOf(const SequenceReader& reader, std::size_t first, std::size_t last) {
+std::uint64_t bytesOfFrames(const SequenceReader& reader, std::size_t first, std::size_t last) {
   std::uint64_t bytes = 0;
   for (std::size_t i = first; i <= last; ++i) bytes += reader.frames()[i].bytes;
   return bytes;
 }
 
 TEST_F(SequenceFile, HasTheBytesOfTheGoldenOne) {
-  test::writeGoldenSequence(path());
+  writeGoldenSequence(path());
   EXPECT_EQ(bytesIn(path()), bytesIn(ESVR_GOLDEN_SEQUENCE));
 }
 
 TEST_F(SequenceFile, IsOpenedByReadingItsIndexAlone) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   const SequenceReader reader(path());
   const SequenceFrame& last = reader.frames().back();
   // The magic number is read twice: alone, and with the header.
@@ -313,36 +308,37 @@ TEST_F(SequenceFile, IsOpenedByReadingItsIndexAlone) {
 }
 
 TEST_F(SequenceFile, ReadsAFrameThatRefersToNoneAlone) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   SequenceReader reader(path());
   const std::uint64_t opened = reader.bytesRead();
   expectFrame(reader, 2);
-  EXPECT_EQ(reader.bytesRead() - opened, bytesOf(reader, 5, 5));
+  EXPECT_EQ(reader.bytesRead() - opened, bytesOfFrames(reader, 5, 5));
 }
 
 TEST_F(SequenceFile, ReadsAtMostTheFramesOfAGroupForOneFrame) {
-  test::writeChains(path(), kGroups);
+  writeChains(path(), kGroups);
   EXPECT_THAT(checkSequence(path()), IsEmpty());
   SequenceReader reader(path());
   const std::uint64_t opened = reader.bytesRead();
   expectFrame(reader, 2);
-  EXPECT_EQ(reader.bytesRead() - opened, bytesOf(reader, 3, 5));
+  EXPECT_EQ(reader.bytesRead() - opened, bytesOfFrames(reader, 3, 5));
   const std::uint64_t before = reader.bytesRead();
   expectFrame(reader, 4);
-  EXPECT_EQ(reader.bytesRead() - before, bytesOf(reader, 6, 6)) << "the frame before it was kept";
+  EXPECT_EQ(reader.bytesRead() - before, bytesOfFrames(reader, 6, 6))
+      << "the frame before it was kept";
 }
 
 TEST_F(SequenceFile, DecodesEachFrameOnceWhenItIsReadForward) {
-  test::writeChains(path(), kGroups);
+  writeChains(path(), kGroups);
   SequenceReader reader(path());
   const std::uint64_t opened = reader.bytesRead();
   for (int pass = 0; pass < 2; ++pass)
     for (const SequenceFrame& frame : reader.frames()) expectFrame(reader, frame.number);
-  EXPECT_EQ(reader.bytesRead() - opened, 2 * bytesOf(reader, 0, 7));
+  EXPECT_EQ(reader.bytesRead() - opened, 2 * bytesOfFrames(reader, 0, 7));
 }
 
 TEST_F(SequenceFile, IsNoSingleFile) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   expectRefused<BadInput>([&] { (void)readEsvr(path()); }, "holds a sequence");
   expectRefused<BadInput>([&] { (void)readEsvrPart(path(), {}); }, "holds a sequence");
   (void)writeEsvr(folder_ / "one.esvr", sampleFrame(1));
@@ -352,7 +348,7 @@ TEST_F(SequenceFile, IsNoSingleFile) {
 
 TEST_F(SequenceFile, IsRefusedByReadersOfEarlierVersions) {
   // A reader that does not know a required section refuses the file.
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   const auto table = format::readTable(format::FileSource(path()));
   EXPECT_EQ(table.versionMinor, 3);
   ASSERT_EQ(table.entries.size(), 1u);
@@ -360,7 +356,7 @@ TEST_F(SequenceFile, IsRefusedByReadersOfEarlierVersions) {
 }
 
 TEST_F(SequenceFile, IsResumedAfterAnyByte) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   const auto whole = bytesIn(path());
   const SequenceReader reader(path());
   std::vector<std::size_t> complete(whole.size() + 1);  // number of groups by the number of bytes
@@ -385,7 +381,7 @@ TEST_F(SequenceFile, IsResumedAfterAnyByte) {
     return last == n ? n + 1 : last;
   };
   for (std::size_t n = 0; n <= left.size(); n = next(n)) {
-    test::writeBytes(partial(), {left.begin(), left.begin() + std::ptrdiff_t(n)});
+    writeBytes(partial(), {left.begin(), left.begin() + std::ptrdiff_t(n)});
     SequenceWriter writer(path(), {.overwrite = true, .partial = PartialSequence::kResume});
     ASSERT_EQ(writer.groupCount(), complete[n]) << n;
     for (std::size_t g = writer.groupCount(); g < kGroups.size(); ++g)
@@ -396,7 +392,7 @@ TEST_F(SequenceFile, IsResumedAfterAnyByte) {
 }
 
 TEST_F(SequenceFile, IsResumedWhereOnlyItsNameIsMissing) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   const auto whole = bytesIn(path());
   fs::rename(path(), partial());
   SequenceWriter writer(path(), {.partial = PartialSequence::kResume});
@@ -406,7 +402,7 @@ TEST_F(SequenceFile, IsResumedWhereOnlyItsNameIsMissing) {
 }
 
 TEST_F(SequenceFile, DropsGroupsThatAreWrittenAgain) {
-  test::writeSequence(path(), kGroups);
+  writeSequence(path(), kGroups);
   const auto whole = bytesIn(path());
   fs::rename(path(), partial());
   SequenceWriter writer(path(), {.partial = PartialSequence::kResume});
@@ -440,7 +436,7 @@ TEST_F(SequenceFile, LeavesNothingWithoutAGroup) {
 }
 
 TEST_F(SequenceFile, KeepsAnotherFileThatHasTheNameOfThePartialOne) {
-  test::writeBytes(partial(), test::bytesOf(std::string(100, 'x')));
+  writeBytes(partial(), bytesOf(std::string(100, 'x')));
   for (const auto start : {PartialSequence::kResume, PartialSequence::kRefuse})
     EXPECT_THROW(SequenceWriter(path(), {.partial = start}), Error);
   EXPECT_EQ(bytesIn(partial()).size(), 100u);
@@ -472,4 +468,4 @@ TEST_F(SequenceFile, TakesIncreasingNumbersOnly) {
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

@@ -82,13 +82,13 @@ std::vector<Frame> hundredFrames() {
 }
 
 TEST(FrameWorkers, GetEveryFrameWithAnInputOnce) {
-  const auto frames = hundredFrames();
+  const auto frames = framesWithInput(hundredFrames());
   const CancelToken cancel;
   for (const int workers : {1, 4}) {
-    std::vector<std::atomic<int>> times(frames.size());
-    forEachFrame({frames, workers, OnFrameError::kContinue, cancel}, [&](const FrameTask& task) {
+    std::vector<std::atomic<int>> times(100);
+    forEachTask({frames.size(), workers, OnFrameError::kContinue, cancel}, [&](const Task& task) {
       EXPECT_LT(task.worker, workers);
-      ++times[task.frame];
+      ++times[frames[task.index]];
       return false;
     });
     for (std::size_t i = 0; i < times.size(); ++i) EXPECT_EQ(times[i], i == 50 ? 0 : 1) << i;
@@ -98,10 +98,9 @@ TEST(FrameWorkers, GetEveryFrameWithAnInputOnce) {
 /// The frames that one worker begins. \param job  its result for the frame with index 3
 std::size_t begunBy(OnFrameError onError, CancelToken& cancel, const std::function<bool()>& third) {
   std::size_t begun = 0;
-  const auto frames = hundredFrames();
-  forEachFrame({frames, 1, onError, cancel}, [&](const FrameTask& task) {
+  forEachTask({99, 1, onError, cancel}, [&](const Task& task) {
     ++begun;
-    return task.frame == 3 ? third() : true;
+    return task.index == 3 ? third() : true;
   });
   return begun;
 }
@@ -122,19 +121,18 @@ TEST(FrameWorkers, StopAfterACancellation) {
 }
 
 TEST(FrameWorkers, PassOnAnException) {
-  const auto frames = hundredFrames();
   const CancelToken cancel;
   for (const int workers : {1, 4})
-    EXPECT_THROW(forEachFrame({frames, workers, OnFrameError::kContinue, cancel},
-                              [](const FrameTask&) -> bool { throw BadInput("a frame"); }),
+    EXPECT_THROW(forEachTask({99, workers, OnFrameError::kContinue, cancel},
+                             [](const Task&) -> bool { throw BadInput("a frame"); }),
                  BadInput);
 }
 
 TEST(FrameWorkers, AreNotMoreThanThreadsOrInputs) {
-  EXPECT_EQ(frameWorkers(3, hundredFrames()), 3);
-  EXPECT_EQ(frameWorkers(1000, hundredFrames()), 99);
-  EXPECT_EQ(frameWorkers(8, std::vector<Frame>(2)), 2);
-  EXPECT_GE(frameWorkers(0, hundredFrames()), 1);
+  EXPECT_EQ(taskWorkers(3, 99), 3);
+  EXPECT_EQ(taskWorkers(1000, 99), 99);
+  EXPECT_EQ(taskWorkers(8, 2), 2);
+  EXPECT_GE(taskWorkers(0, 99), 1);
 }
 
 TEST(Turnstile, IsPassedInTheOrderOfTheTasks) {

@@ -1,6 +1,7 @@
 """Volumes that several tests need."""
 import os
 import pathlib
+import subprocess
 
 import numpy as np
 import pytest
@@ -24,6 +25,26 @@ def volume(ball):
 @pytest.fixture(scope="session")
 def grid(volume):
     return esvr.fit(volume, count=40, preset="draft", representation="ellipsoids", device="cpu")
+
+
+@pytest.fixture(scope="session")
+def run():
+    """Runs a program of the build and returns what it prints; tests that need one are skipped without it."""
+    def run_program(name, *words):
+        program = pathlib.Path(os.environ.get("ESVR_BIN", "/nowhere")) / {"esvr-sample": "samples"}.get(name, name) / name
+        if not program.is_file():
+            pytest.skip(f"ESVR_BIN has no {name}")
+        return subprocess.run([program, *words], check=True, text=True, stdout=subprocess.PIPE).stdout
+    return run_program
+
+
+@pytest.fixture
+def frames(tmp_path, ball, run):
+    """A file with the ball as frame 3 and 4, times the number of the frame."""
+    for frame in (3, 4):
+        esvr.Volume.from_numpy(ball * frame).save(tmp_path / f"b.{frame}.vdb")
+    run("vdb2esvr", tmp_path / "b.@.vdb", tmp_path / "b.esvr", "--lossless", "-q")
+    return tmp_path / "b.esvr"
 
 
 @pytest.fixture

@@ -1,17 +1,8 @@
 """esvr.convert gives the bytes of vdb2esvr, from a file and from volumes."""
-import os
-import subprocess
-
 import numpy as np
 import pytest
 
 import esvr
-
-
-def vdb2esvr(source, out, *options):
-    program = os.path.join(os.environ["ESVR_BIN"], "vdb2esvr", "vdb2esvr")
-    subprocess.run([program, source, out, "--device", "cpu", "-q", *options], check=True)
-    return out.read_bytes()
 
 
 def packed(name, array, type="float"):
@@ -39,10 +30,11 @@ def source(tmp_path, ball):
     ({"lossless": True}, ["--lossless"]),
     ({"max_error": 0.02}, ["--max-error", "0.02"]),
     ({"preset": "draft", "representation": "ellipsoids"}, ["--preset", "draft", "--representation", "ellipsoids"])])
-def test_a_converted_file_is_that_of_vdb2esvr(tmp_path, source, goal, options):
+def test_a_converted_file_is_that_of_vdb2esvr(tmp_path, source, goal, options, run):
     file = esvr.convert(source, device="cpu", **goal)
     esvr.write(tmp_path / "python.esvr", file)
-    assert (tmp_path / "python.esvr").read_bytes() == vdb2esvr(source, tmp_path / "program.esvr", *options)
+    run("vdb2esvr", source, tmp_path / "program.esvr", "--device", "cpu", "-q", *options)
+    assert (tmp_path / "python.esvr").read_bytes() == (tmp_path / "program.esvr").read_bytes()
 
 
 def test_volumes_share_what_they_have_in_common(tmp_path, ball):

@@ -45,19 +45,16 @@ def test_examples_run(tmp_path, monkeypatch, volume):
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*.py")))
 @pytest.mark.parametrize("real", [False, True])
-def test_example_runs(name, real, tmp_path, request):
+def test_example_runs(name, real, tmp_path, request, run):
     if name == "weather_scientist":
         pytest.importorskip("xarray")
     if real:
         source = request.getfixturevalue("data") / REAL[name]
-    elif "ESVR_BIN" in os.environ:
-        source = tmp_path / "in.vdb"
-        subprocess.run([f"{os.environ['ESVR_BIN']}/samples/esvr-sample", SAMPLES[name], source, "--resolution", "32", "--quiet"],
-                       check=True)
     else:
-        pytest.skip("there is no esvr-sample")
+        source = tmp_path / "in.vdb"
+        run("esvr-sample", SAMPLES[name], source, "--resolution", "32", "--quiet")
     package = pathlib.Path(esvr.__file__).parent.parent
-    run = subprocess.run([sys.executable, "-W", "error::UserWarning", EXAMPLES / f"{name}.py", source], cwd=tmp_path, text=True,
+    ran = subprocess.run([sys.executable, "-W", "error::UserWarning", EXAMPLES / f"{name}.py", source], cwd=tmp_path, text=True,
                          capture_output=True, env={**os.environ, "PYTHONPATH": str(package)})
-    assert run.returncode == 0, run.stdout + run.stderr
-    assert "<esvr." in run.stdout
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "<esvr." in ran.stdout

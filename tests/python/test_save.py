@@ -1,15 +1,8 @@
 """Files are saved as VDB as esvr2vdb writes them, and sequences are read in their order."""
-import os
-import subprocess
-
 import numpy as np
 import pytest
 
 import esvr
-
-
-def program(name):
-    return os.path.join(os.environ["ESVR_BIN"], name, name)
 
 
 @pytest.fixture
@@ -32,37 +25,31 @@ def content(path):
     ({"box": ((0, 105, 10), (7, 112, 17))}, ["--bbox", "0,105,10,7,112,17"]),
     ({"layers": 1}, ["--lod", "1"]),
     ({"max_ellipsoids": 10}, ["--max-ellipsoids", "10"])])
-def test_a_saved_file_is_that_of_esvr2vdb(tmp_path, path, part, options):
+def test_a_saved_file_is_that_of_esvr2vdb(tmp_path, path, part, options, run):
     assert esvr.read(path).save(tmp_path / "saved.vdb", **part) == []
-    subprocess.run([program("esvr2vdb"), path, tmp_path / "written.vdb", *options], check=True)
+    run("esvr2vdb", path, tmp_path / "written.vdb", *options)
     assert content(tmp_path / "saved.vdb") == content(tmp_path / "written.vdb")
 
 
-def carrying(tmp_path, *names):
+def carrying(tmp_path, run, *names):
     """A file of two grids, of which those named are carried."""
-    sample = os.path.join(os.environ["ESVR_BIN"], "samples/esvr-sample")
-    subprocess.run([sample, "two-grids", tmp_path / "two.vdb", "--resolution", "16"], check=True)
+    run("esvr-sample", "two-grids", tmp_path / "two.vdb", "--resolution", "16")
     keep = [word for name in names for word in ("--keep", name)]
-    subprocess.run([program("vdb2esvr"), tmp_path / "two.vdb", tmp_path / "two.esvr", "-q", *keep], check=True)
+    run("vdb2esvr", tmp_path / "two.vdb", tmp_path / "two.esvr", "-q", *keep)
     return esvr.read(tmp_path / "two.esvr")
 
 
-def names_in(path):
-    listed = subprocess.run([program("esvr2vdb"), "--list", path], check=True, text=True, stdout=subprocess.PIPE).stdout
-    return [name for name in ("density", "temperature") if name in listed]
-
-
-def test_carried_grids_are_saved_unless_the_file_is_cut(tmp_path):
-    file = carrying(tmp_path, "density")
+def test_carried_grids_are_saved_unless_the_file_is_cut(tmp_path, run):
+    file = carrying(tmp_path, run, "density")
     assert file.carried == ["density"] and len(file) == 1
     assert file.save(tmp_path / "whole.vdb") == []
     assert file.save(tmp_path / "cut.vdb", box=((0, 0, 0), (9, 9, 9))) == ["density"]
-    assert names_in(tmp_path / "whole.vdb") == ["density", "temperature"]
-    assert names_in(tmp_path / "cut.vdb") == ["temperature"]
+    assert [name for name, _ in esvr.list_grids(tmp_path / "whole.vdb")] == ["density", "temperature"]
+    assert [name for name, _ in esvr.list_grids(tmp_path / "cut.vdb")] == ["temperature"]
 
 
-def test_a_file_without_a_grid_that_can_be_cut_is_refused(tmp_path):
-    file = carrying(tmp_path, "density", "temperature")
+def test_a_file_without_a_grid_that_can_be_cut_is_refused(tmp_path, run):
+    file = carrying(tmp_path, run, "density", "temperature")
     with pytest.raises(esvr.BadInput, match="no grid is left"):
         file.save(tmp_path / "cut.vdb", box=((0, 0, 0), (9, 9, 9)))
 
@@ -83,11 +70,8 @@ def test_wrong_parts_are_refused(tmp_path, path, part, text):
     assert not (tmp_path / "a.vdb").exists()
 
 
-def test_a_sequence_has_the_frames_that_read_gives(tmp_path, ball):
-    for frame in (3, 4):
-        esvr.Volume.from_numpy(ball * frame).save(tmp_path / f"b.{frame}.vdb")
-    subprocess.run([program("vdb2esvr"), tmp_path / "b.@.vdb", tmp_path / "b.esvr", "--lossless", "-q"], check=True)
-    sequence = esvr.Sequence(tmp_path / "b.esvr")
+def test_a_sequence_has_the_frames_that_read_gives(frames, ball):
+    sequence = esvr.Sequence(frames)
     assert sequence.frames == [3, 4]
     read = [sequence.read(frame)["density"].to_volume() for frame in (3, 4, 3)]
     for frame, volume in zip((3, 4, 3), read):  # a frame is not changed by reading another one

@@ -1,15 +1,8 @@
 """Splats are written and read as esvr2vdb does it."""
-import os
-import subprocess
-
 import numpy as np
 import pytest
 
 import esvr
-
-
-def program(name):
-    return os.path.join(os.environ["ESVR_BIN"], name, name)
 
 
 @pytest.mark.parametrize("name, arguments, options", [
@@ -17,10 +10,10 @@ def program(name):
     ("a.ply", {"kind": "mitsuba", "colors": (0.5, 0.25, 1.0), "up": "z"},
      ["--kind", "mitsuba", "--colors", "0.5,0.25,1", "--up", "z"]),
     ("a.usda", {"density_scale": 2.0}, ["--density-scale", "2"])])
-def test_written_splats_are_those_of_esvr2vdb(tmp_path, grid, name, arguments, options):
+def test_written_splats_are_those_of_esvr2vdb(tmp_path, grid, name, arguments, options, run):
     esvr.write(tmp_path / "ball.esvr", [grid])
     esvr.write_splats(tmp_path / name, esvr.read(tmp_path / "ball.esvr")["density"], **arguments)
-    subprocess.run([program("esvr2vdb"), tmp_path / "ball.esvr", tmp_path / ("of-" + name), *options], check=True)
+    run("esvr2vdb", tmp_path / "ball.esvr", tmp_path / ("of-" + name), *options)
     assert (tmp_path / name).read_bytes() == (tmp_path / ("of-" + name)).read_bytes()
 
 

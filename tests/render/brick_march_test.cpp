@@ -1,18 +1,12 @@
 // Plan: marching through bricks of cells agrees with renderVolume, which reads the same voxels
 // through neighbouring bricks. Positions are float32 here, with errors of 1e-5 voxel, so that a few
-// samples fall into the next cell, whose value is nearly the same. The cases are bricks that are
-// apart, touch or have negative positions, and empty blocks between them.
+// samples fall into the next cell, whose value is nearly the same.
 //
-// Rays also march through bricks that are there only once a ray has asked for them. Whenever a ray
-// waits, its state is replaced by what is kept of it. Its color must have the bits of a march
-// through bricks that are all there, in all modes, with gaps between the bricks, and for several
-// grids.
+// A ray that waits for bricks is replaced by what is kept of it. Its color must have the bits of a
+// march through bricks that are all there.
 //
-// Voxels of coarser levels are means. A picture whose pixels are wide is that of the coarser
-// volume, drawn for itself. Where a ray passes from level to level, nothing is lost or counted
-// twice: a homogeneous medium looks the same with and without levels. The pictures of a field's
-// cells, which average brick by brick, agree with those of averaged volumes. Pictures are closer to
-// those with many rays a pixel than without levels.
+// Voxels of coarser levels are means. Where a ray passes from level to level, nothing is lost or
+// counted twice: a homogeneous medium looks the same with and without levels.
 #include "render/brick_march.h"
 
 #include <gtest/gtest.h>
@@ -20,11 +14,11 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "field/random_field.h"
-#include "render/brick_scene.h"
 #include "render/cell_bricks.h"
 #include "render/grids_march.h"
 #include "render/picture.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 
 namespace esvr::test {
 namespace {
@@ -73,7 +67,7 @@ void expectTheVolumesPicture(const SparseVolume& volume, const CameraWish& wish 
 TEST(BrickAtlas, MarchesToTheVolumesPicture) {
   const auto volume = volumeAt({{0, 0, 0}, {0, 0, 8}, {8, 8, 8}, {40, 0, 16}, {-16, 40, -32}});
   expectTheVolumesPicture(volume);
-  expectTheVolumesPicture(volume, {.projection = Projection::kOrthographic});
+  expectTheVolumesPicture(volume, orthographic());
   expectTheVolumesPicture(volume,
                           {.eye = Vec3{9, 10, 11}, .center = Vec3{40, 12, 20}, .fov = 90.0});
 }
@@ -336,8 +330,8 @@ TEST(LevelOfDetail, MeansOfEqualValuesAreThatValue) {
   }
 }
 
-RenderOptions orthographic(const SparseVolume& volume) {
-  RenderOptions o = optionsFor(volume, {.projection = Projection::kOrthographic});
+RenderOptions withLevels(const SparseVolume& volume) {
+  RenderOptions o = optionsFor(volume, orthographic());
   o.lod = LevelOfDetail::kAuto;
   return o;
 }
@@ -347,7 +341,7 @@ TEST(LevelOfDetail, WidePixelsShowTheCoarserVolume) {
   VolumeLevels levels(volume);
   levels.prepare(3);
   for (const int level : {1, 2, 3}) {
-    RenderOptions o = orthographic(volume), own = o;
+    RenderOptions o = withLevels(volume), own = o;
     const LevelFrame frame{level};
     o.resolution = own.resolution = {20, 20};
     o.camera.height = 20.0 * 3.5 * frame.side();  // a pixel is 3.5 voxels of the level wide
@@ -366,21 +360,14 @@ RenderOptions manyLevels() {
   RenderOptions o;
   o.resolution = {16, 12};
   o.camera = {.eye = {13, 11, -20}, .center = {12, 14, 100}, .up = {0, 1, 0}, .fov = 120.0};
-  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  o.transfer = viridis();
   o.opacityLength = 40.0;
   return o;
 }
 
 /// A cube of 128^3 voxels that has one value in front of z = 64 and another behind.
 SparseVolume halves(float front, float behind) {
-  std::vector<BrickInput> bricks;
-  for (int n = 0; n < 16 * 16 * 16; ++n) {
-    BrickInput brick{Coord{n / 256, n / 16 % 16, n % 16} * kBrickSide, {}, {}};
-    brick.values.fill(brick.corner.z < 64 ? front : behind);
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), 0.0f);
+  return cubeOf(16, 0.0f, [&](Coord at) { return at.z < 64 ? front : behind; });
 }
 
 TEST(LevelOfDetail, RaysPassFromLevelToLevelWithoutASeam) {
@@ -437,7 +424,7 @@ TEST(LevelOfDetail, PicturesAreCloserToThoseWithManyRays) {
   std::vector<Coord> corners;
   for (int n = 0; n < 512; ++n) corners.push_back(Coord{n / 64, n / 8 % 8, n % 8} * kBrickSide);
   const SparseVolume volume = randomBricks(corners, 7);
-  RenderOptions o = orthographic(volume);
+  RenderOptions o = withLevels(volume);
   o.resolution = {12, 12};
   o.camera.height = 72.0;
   // Light grows with the value, so that the light of a mean is the mean of the light.
@@ -455,7 +442,7 @@ TEST(LevelOfDetail, PicturesAreCloserToThoseWithManyRays) {
 
 TEST(LevelOfDetail, AThinClipBoxIsNotMissed) {
   const SparseVolume volume = noise();
-  RenderOptions o = orthographic(volume), without = o;
+  RenderOptions o = withLevels(volume), without = o;
   o.camera.height = without.camera.height = 1000.0;
   o.clip = without.clip = PlaceBox{{-100, -100, 3.0}, {100, 100, 4.5}};
   without.lod = LevelOfDetail::kOff;

@@ -7,25 +7,20 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
 #include <thread>
 
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 
 namespace esvr::test {
 namespace {
 
-constexpr Box kShownBox{{0, 0, 0}, {39, 39, 39}};
-
 RenderOptions options(Resolution resolution = {96, 64}) {
-  RenderOptions o;
-  o.resolution = resolution;
-  o.camera = fitCamera(kShownBox, {}, resolution);
-  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
-  o.opacityLength = 20.0;
-  return o;
+  return pictureOf(kFieldBox, resolution, 20.0);
 }
 
 Field blobs() { return randomField({.count = 20, .smallest = 5.0}); }
@@ -52,23 +47,32 @@ TEST(ProgressivePicture, EndsWithThePicture) {
   }
 }
 
-/// Waits for a time that follows the pixels.
-class WaitingRenderer final : public Renderer {
+/// Gives pictures of the value 1 after a call with their sizes.
+class PlainRenderer final : public Renderer {
  public:
+  explicit PlainRenderer(std::function<void(Resolution)> before) : before_(std::move(before)) {}
   Image draw(const RenderOptions& o) override {
     const Resolution r = o.resolution;
-    std::this_thread::sleep_for(std::chrono::microseconds(r.width * r.height));
-    return {r.width, r.height,
-            std::vector<float>(std::size_t(4) * std::size_t(r.width) * std::size_t(r.height))};
+    before_(r);
+    return {
+        r.width, r.height,
+        std::vector<float>(std::size_t(4) * std::size_t(r.width) * std::size_t(r.height), 1.0f)};
   }
   void drawOnDevice(const RenderOptions& o) override { (void)draw(o); }
   FrameStats stats() const override { return {}; }
+
+ private:
+  std::function<void(Resolution)> before_;
 };
+
+void waitForEachPixel(Resolution r) {
+  std::this_thread::sleep_for(std::chrono::microseconds(r.width * r.height));
+}
 
 TEST(ProgressivePicture, KeepsToItsBudget) {
   // The passes wait for 6, 25, 100 and 410 ms; other work and late wake-ups make them longer only.
   // A loaded machine can thus leave out a pass, but never draw one more.
-  WaitingRenderer renderer;
+  PlainRenderer renderer(waitForEachPixel);
   ProgressivePicture picture(renderer, options({640, 640}));
   EXPECT_FALSE(picture.refine(0.3)) << "the last pass alone takes 0.41 s";
   EXPECT_FALSE(picture.complete());
@@ -93,26 +97,10 @@ TEST(ProgressivePicture, ACancelledPassLeavesTheLastOne) {
   EXPECT_FALSE(picture.complete());
 }
 
-/// Fails after a number of pictures of the value 1.
-class FailingRenderer final : public Renderer {
- public:
-  explicit FailingRenderer(int pictures) : left_(pictures) {}
-  Image draw(const RenderOptions& o) override {
-    if (left_-- == 0) throw DeviceError("the device is gone");
-    const Resolution r = o.resolution;
-    return {
-        r.width, r.height,
-        std::vector<float>(std::size_t(4) * std::size_t(r.width) * std::size_t(r.height), 1.0f)};
-  }
-  void drawOnDevice(const RenderOptions& o) override { (void)draw(o); }
-  FrameStats stats() const override { return {}; }
-
- private:
-  int left_;
-};
-
 TEST(ProgressivePicture, AFailureLeavesTheLastPassOfTheSameCall) {
-  FailingRenderer renderer(2);
+  PlainRenderer renderer([left = 2](Resolution) mutable {
+    if (left-- == 0) throw DeviceError("the device is gone");
+  });
   ProgressivePicture picture(renderer, options());
   EXPECT_THROW(picture.refine(1000.0), DeviceError);
   ASSERT_TRUE(picture.image());
@@ -121,7 +109,7 @@ TEST(ProgressivePicture, AFailureLeavesTheLastPassOfTheSameCall) {
 }
 
 TEST(ProgressivePicture, RefusesWrongOptionsAtOnce) {
-  WaitingRenderer renderer;
+  PlainRenderer renderer(waitForEachPixel);
   RenderOptions o = options();
   o.step = -1.0;
   EXPECT_THROW(ProgressivePicture(renderer, o), UsageError);

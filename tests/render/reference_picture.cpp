@@ -1,5 +1,7 @@
 #include "render/reference_picture.h"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -192,10 +194,30 @@ double imagePsnr(const Image& a, const Image& b) {
 }
 
 double largestDifference(const Image& a, const Image& b) {
-  double largest = 0.0;
-  for (std::size_t i = 0; i < a.rgba.size(); ++i)
-    largest = std::max(largest, std::abs(double(a.rgba[i]) - b.rgba.at(i)));
+  double largest = a.rgba.size() == b.rgba.size() ? 0.0 : 1.0;
+  for (std::size_t i = 0; i < std::min(a.rgba.size(), b.rgba.size()); ++i)
+    largest = std::max(largest, std::abs(double(a.rgba[i]) - double(b.rgba[i])));
   return largest;
+}
+
+void expectAnyLight(const Image& image) {
+  EXPECT_GT(std::ranges::count_if(image.rgba, [](float v) { return v > 0.0f; }), 0);
+}
+
+void expectTransparent(const Image& image) {
+  EXPECT_FALSE(image.rgba.empty());
+  for (const float v : image.rgba) ASSERT_EQ(v, 0.0f);
+}
+
+void expectClose(const Image& image, const Image& expected, std::size_t many) {
+  ASSERT_EQ(image.rgba.size(), expected.rgba.size());
+  std::size_t different = 0, lit = 0;
+  for (std::size_t i = 0; i < image.rgba.size(); ++i) {
+    different += std::abs(image.rgba[i] - expected.rgba[i]) > 1.0f / 255.0f;
+    lit += expected.rgba[i] > 0.1f;
+  }
+  EXPECT_LE(different, image.rgba.size() / many);
+  EXPECT_GT(lit, 0u) << "an empty picture proves nothing";
 }
 
 }  // namespace esvr::test

@@ -87,6 +87,13 @@ struct SampledScene {
 
 /// The PSNR over all four channels with a peak of 1.
 [[nodiscard]] double imagePsnr(const Image& a, const Image& b);
+/// The largest difference of a channel; 1 if the pictures differ in size.
 [[nodiscard]] double largestDifference(const Image& a, const Image& b);
+/// Expects that a picture shows anything, because an empty one proves nothing.
+void expectAnyLight(const Image& image);
+void expectTransparent(const Image& image);
+/// Expects channels to agree to within 1/255, but for one in `many`: rounding decides about the few
+/// voxels whose value is at the threshold.
+void expectClose(const Image& image, const Image& expected, std::size_t many = 1000);
 
 }  // namespace esvr::test

@@ -6,7 +6,6 @@
 // If a rule has a threshold, a voxel at the threshold may be active in one picture only: 70 dB.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <string>
 
 #include "esvr/fit.h"
@@ -14,31 +13,22 @@
 #include "esvr/vdb_io.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 #include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
 
 constexpr double kAskedOfCells = 80.0, kAskedByThreshold = 70.0;
-constexpr Box kCellsBox{{0, 0, 0}, {39, 39, 39}};
 
 RenderOptions cellOptions(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
-  RenderOptions o;
-  o.resolution = resolution;
-  o.camera = fitCamera(kCellsBox, wish, resolution);
-  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
-  o.opacityLength = 8.0;
-  return o;
+  return pictureOf(kFieldBox, resolution, 8.0, wish);
 }
-
-CameraWish orthographic() { return {.projection = Projection::kOrthographic}; }
 
 double voxelAgreement(const Field& field, const RenderOptions& o,
                       const RevoxeliseOptions& rule = {}) {
   const Image drawn = renderField(field, o, rule);
-  double light = 0.0;
-  for (const float v : drawn.rgba) light += v;
-  EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+  expectAnyLight(drawn);
   return imagePsnr(renderVolume(revoxelise(field, rule), o), drawn);
 }
 
@@ -56,17 +46,13 @@ TEST(RenderCells, DrawsTheVoxelsPictureFromEveryDirection) {
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureFromInside) {
-  for (const double fov : {80.0, 170.0}) {
-    const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = fov};
-    EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(inside)), kAskedOfCells)
+  for (const double fov : {80.0, 170.0})
+    EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(inside(fov))), kAskedOfCells)
         << fov;
-  }
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureFromFarAway) {
-  CameraWish far{.eye = Vec3{1e6, 2e6, 3.3e6}, .center = Vec3{20, 20, 20}};
-  far.fov = 2.0 * std::atan(30.0 / 4e6) * 180.0 / 3.14159265358979;
-  EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(far)), kAskedOfCells);
+  EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(farAway())), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureAtEveryStep) {
@@ -112,16 +98,11 @@ TEST(RenderCells, DrawsTheVoxelsPictureOfSmallAndThinEllipsoids) {
 
 TEST(RenderCells, DrawsOneEllipsoidThatCoversEverything) {
   // The error is that of float32 at distances of hundreds of voxels: 1e-5.
-  Field field = randomField({.count = 1, .smallest = 60.0, .aspect = 1.5});
-  field.chunks[0].ellipsoids.intensity[0] = 0.3f;
-  EXPECT_GE(voxelAgreement(field, cellOptions()), kAskedOfCells);
+  EXPECT_GE(voxelAgreement(oneEllipsoid(60.0, 0.3f, 1.5), cellOptions()), kAskedOfCells);
 }
 
 TEST(RenderCells, DrawsABackgroundSeveralChunksAndKappas) {
-  Field field = randomField({.count = 20});
-  field.background = 0.25f;
-  field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
-  field.chunks[1].origin = {16, -8, 8};
+  Field field = twoChunks();
   field.chunks[0].ellipsoids.kappa.assign(20, 1.0f);
   field.chunks[0].ellipsoids.kappa[3] = 20.0f;
   field.chunks[1].ellipsoids.kappa.assign(20, 4.0f);
@@ -143,17 +124,9 @@ TEST(RenderCells, DrawsByTheRuleOfTheVoxels) {
 TEST(RenderCells, DrawsTheVoxelsOfMasksWithinABox) {
   const Field field = randomField({.count = 200});
   const Box box{{3, 0, 0}, {30, 22, 39}};
-  const auto bricks = reachedBricks(field, {{0, 0, 0}, {23, 39, 39}});
-  std::vector<BrickMask> masks(bricks.size());
-  for (std::size_t b = 0; b < masks.size(); ++b)
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if ((v + int(b)) % 16 < 8) masks[b].set(v);
-  const RevoxeliseOptions boxed{.box = box},
-      masked{.bricks = bricks, .restrictToBricks = true, .masks = masks, .box = box};
-  RenderOptions far = cellOptions();
-  far.resolution = {20, 15};
-  far.camera = fitCamera({{-20, -20, -20}, {60, 60, 60}}, {}, far.resolution);
-  for (const RevoxeliseOptions& rule : {boxed, masked}) {
+  const HalfMasks masked(field, {{0, 0, 0}, {23, 39, 39}});
+  const RenderOptions far = pictureOf({{-20, -20, -20}, {60, 60, 60}}, {20, 15}, 8.0);
+  for (const RevoxeliseOptions& rule : {RevoxeliseOptions{.box = box}, masked.within(box)}) {
     EXPECT_GE(voxelAgreement(field, cellOptions(), rule), kAskedOfCells);
     EXPECT_GE(voxelAgreement(field, far, rule), kAskedOfCells) << "means of coarser levels";
     EXPECT_LT(imagePsnr(renderField(field, cellOptions(), rule), renderField(field, cellOptions())),
@@ -174,22 +147,13 @@ TEST(RenderCells, DrawsVoxelsThatAreAlwaysActive) {
       60.0);
 }
 
-/// Puffs over 60,000 voxels, with nothing between them.
-Field puffsFarApart() {
-  constexpr double kExtent = 60'000.0;
-  return randomField({.count = 60, .extent = kExtent, .smallest = 3.0, .aspect = 2.0, .seed = 11});
-}
-
 TEST(RenderCells, DrawsEllipsoidsThatLieFarApart) {
-  Field field = puffsFarApart();
-  Ellipsoids& e = field.chunks[0].ellipsoids;
-  for (float& intensity : e.intensity) intensity = 0.5f + 0.5f * std::abs(intensity);
+  const Field field = puffsFarApart();
   const SparseVolume volume = revoxelise(field, {});
   const auto renderer = makeFieldRenderer(field, Device{});
   for (const std::size_t i : {0u, 17u, 59u}) {
-    const Vec3 puff{e.center[0][i], e.center[1][i], e.center[2][i]};
     RenderOptions o = cellOptions();
-    o.camera.center = puff, o.camera.eye = {puff[0] + 10.0, puff[1] + 30.0, puff[2] + 60.0};
+    lookAt(field, i, o.camera);
     const Image expected = renderVolume(volume, o), drawn = renderer->draw(o);
     EXPECT_GE(imagePsnr(expected, drawn), kAskedOfCells);
     EXPECT_GT(drawn.rgba[4 * (18 * 50 + 25) + 3], 0.1f) << "the puff in the middle";
@@ -211,9 +175,8 @@ TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(RenderCells, NothingToSeeIsTransparent) {
-  const auto away = cellOptions({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}});
-  for (const float v : renderField(randomField({}), away).rgba) ASSERT_EQ(v, 0.0f);
-  for (const float v : renderField(Field{}, cellOptions()).rgba) ASSERT_EQ(v, 0.0f);
+  expectTransparent(renderField(randomField({}), cellOptions(away())));
+  expectTransparent(renderField(Field{}, cellOptions()));
 }
 
 /// A short fit, in which many ellipsoids are smaller than a voxel.
@@ -226,11 +189,8 @@ TEST(RenderCells, RealFileAgreesWithItsVoxelsAtEveryStep) {
   const FitResult fitted = fit(grid.volume, options);
   const RevoxeliseOptions rule{.threshold = 0.02f};
   const SparseVolume voxels = revoxelise(fitted.field, rule);
-  RenderOptions o;
-  o.resolution = {200, 200};
-  o.camera = fitCamera(activeBox(grid.volume), {}, o.resolution);
-  o.transfer =
-      rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, activeRange(grid.volume));
+  RenderOptions o = pictureOf(activeBox(grid.volume), {200, 200}, 1.0);
+  o.transfer = viridis(activeRange(grid.volume));
   for (const double step : {0.25, 0.5, 1.0, 2.0}) {
     o.step = step;
     EXPECT_GE(imagePsnr(renderVolume(voxels, o), renderField(fitted.field, o, rule)), 60.0) << step;

@@ -27,26 +27,18 @@
 #include "field/random_field.h"
 #include "render/ellipsoid_view.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 #include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
 
 constexpr double kAskedOfSums = 70.0;
-constexpr Box kFieldBox{{0, 0, 0}, {39, 39, 39}};
 
 // Pictures.
 
-TransferFunction viridis(ValueRange range = {-1.0f, 1.0f}) {
-  return rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, range);
-}
-
 RenderOptions sumOptions(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
-  RenderOptions o;
-  o.resolution = resolution;
-  o.camera = fitCamera(kFieldBox, wish, resolution);
-  o.transfer = viridis();
-  o.opacityLength = 8.0;
+  RenderOptions o = pictureOf(kFieldBox, resolution, 8.0, wish);
   o.between = Between::kSum;
   return o;
 }
@@ -61,27 +53,16 @@ double sumAgreement(const Field& field, const RenderOptions& o,
   };
   const Image expected = referencePicture({clamped, field.background, farthest, false}, o);
   const Image drawn = renderField(field, o, {.tone = tone, .range = range});
-  double light = 0.0;
-  for (const float v : drawn.rgba) light += v;
-  EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+  expectAnyLight(drawn);
   return imagePsnr(expected, drawn);
 }
 
-TEST(RenderField, AgreesWithTheReferenceInPerspective) {
-  EXPECT_GE(sumAgreement(randomField({}), sumOptions()), kAskedOfSums);
-}
-
-TEST(RenderField, AgreesWithTheReferenceInOrthographicProjection) {
-  EXPECT_GE(sumAgreement(randomField({}), sumOptions({.projection = Projection::kOrthographic})),
-            kAskedOfSums);
-}
-
-TEST(RenderField, AgreesWithACameraInsideTheVolume) {
-  const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
-  EXPECT_GE(sumAgreement(randomField({}), sumOptions(inside)), kAskedOfSums);
-  CameraWish flat = inside;
+TEST(RenderField, AgreesWithTheReferenceFromEveryKindOfCamera) {
+  CameraWish flat = inside();
   flat.projection = Projection::kOrthographic;
-  EXPECT_GE(sumAgreement(randomField({}), sumOptions(flat)), kAskedOfSums);
+  for (const CameraWish& wish : {CameraWish{}, orthographic(), inside(), flat})
+    EXPECT_GE(sumAgreement(randomField({}), sumOptions(wish)), kAskedOfSums)
+        << int(wish.projection) << (wish.eye ? ", inside" : "");
 }
 
 TEST(RenderField, SlowClampsSumsToTheRangeOfTheVoxels) {
@@ -113,19 +94,14 @@ TEST(RenderField, AgreesForANeedleAlongTheViewRay) {
 }
 
 TEST(RenderField, AgreesForOneEllipsoidThatCoversEverything) {
-  Field field = randomField({.count = 1, .smallest = 300.0});
-  field.chunks[0].ellipsoids.intensity[0] = 0.3f;
-  EXPECT_GE(sumAgreement(field, sumOptions()), kAskedOfSums);
+  EXPECT_GE(sumAgreement(oneEllipsoid(300.0), sumOptions()), kAskedOfSums);
 }
 
 TEST(RenderField, AgreesForEachKernel) {
   for (const float kappa : {-3.0f, 0.0f, 12.0f})
     EXPECT_GE(sumAgreement(randomField({.kappa = kappa}), sumOptions({}, {25, 18})), kAskedOfSums)
         << kappa;
-  Field field = randomField({.count = 15, .kappa = 5.0f});
-  field.chunks[0].ellipsoids.kappa.assign(15, 1.0f);
-  field.chunks[0].ellipsoids.kappa[3] = 20.0f;
-  EXPECT_GE(sumAgreement(field, sumOptions()), kAskedOfSums) << "a kappa of its own each";
+  EXPECT_GE(sumAgreement(ownKappas(), sumOptions()), kAskedOfSums);
 }
 
 TEST(RenderField, AgreesForOtherSteps) {
@@ -137,11 +113,7 @@ TEST(RenderField, AgreesForOtherSteps) {
 }
 
 TEST(RenderField, AgreesWithABackgroundAndSeveralChunks) {
-  Field field = randomField({.count = 20});
-  field.background = 0.25f;
-  field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
-  field.chunks[1].origin = {16, -8, 8};
-  EXPECT_GE(sumAgreement(field, sumOptions()), kAskedOfSums);
+  EXPECT_GE(sumAgreement(twoChunks(), sumOptions()), kAskedOfSums);
 }
 
 TEST(RenderField, FarCamerasLoseNothing) {
@@ -181,12 +153,8 @@ TEST(RenderField, TheEndOfARayCostsLittle) {
 }
 
 TEST(RenderField, WhatIsNotSeenIsTransparent) {
-  const Field field = randomField({});
-  const Image behind =
-      renderField(field, sumOptions({.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}}));
-  for (const float v : behind.rgba) ASSERT_EQ(v, 0.0f);
-  const Image none = renderField(Field{}, sumOptions());
-  for (const float v : none.rgba) ASSERT_EQ(v, 0.0f);
+  expectTransparent(renderField(randomField({}), sumOptions(away())));
+  expectTransparent(renderField(Field{}, sumOptions()));
 }
 
 TEST(RenderField, APixelAloneIsAPicture) {
@@ -200,12 +168,11 @@ TEST(RenderField, FullOpacityShowsTheFirstSampleAndNoneShowsNothing) {
   for (std::size_t i = 3; i < opaque.rgba.size(); i += 4)
     ASSERT_TRUE(opaque.rgba[i] == 0.0f || opaque.rgba[i] == 1.0f);
   o.transfer.opacity = {{0.0, 0.0}};
-  for (const float v : renderField(randomField({}), o).rgba) ASSERT_EQ(v, 0.0f);
+  expectTransparent(renderField(randomField({}), o));
 }
 
 TEST(RenderField, ATransferFunctionBesideTheDataIsTheColorAtItsEnd) {
-  Field field = randomField({.count = 50});
-  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  const Field field = withoutNegatives(randomField({.count = 50}));
   RenderOptions o = sumOptions();
   o.transfer.colors.points = {{100.0, {0.5, 0.25, 0.0}}, {200.0, {0.0, 0.0, 1.0}}};
   o.transfer.opacity = {{100.0, 1.0}, {200.0, 0.0}};
@@ -324,7 +291,7 @@ void expectTight(const Meeting& m, const ScreenBounds& b) {
 Camera cameraFor(Projection projection, const Vec3& eye) {
   CameraWish wish{.eye = eye, .center = Vec3{20, 20, 20}, .fov = 45.0};
   wish.projection = projection;
-  return fitCamera({{0, 0, 0}, {39, 39, 39}}, wish, kPicture);
+  return fitCamera(kFieldBox, wish, kPicture);
 }
 
 class Bounds : public testing::TestWithParam<Projection> {};
@@ -444,8 +411,8 @@ TEST(RenderModes, SlowShowHowDeepHalfOfTheLightComes) {
 }
 
 TEST(RenderModes, OfVoxelsAreThoseOfTheirField) {
-  Field field = randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f});
-  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  const Field field =
+      withoutNegatives(randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f}));
   const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
   for (const auto mode : {RenderMode::kMaximum, RenderMode::kAverage}) {
     RenderOptions o = optionsOf(mode);

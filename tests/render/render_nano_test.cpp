@@ -7,12 +7,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "esvr/field.h"
 #include "esvr/render.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 
 namespace esvr::test {
 namespace {
@@ -28,11 +30,7 @@ VolumeGrid nanoBlobs(Coord origin = {-20, -20, -20}) {
 }
 
 RenderOptions nanoOptions(const CameraWish& wish = {}) {
-  RenderOptions o;
-  o.resolution = {70, 50};
-  o.camera = fitCamera(kNanoBox, wish, o.resolution);
-  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
-  o.opacityLength = 8.0;
+  RenderOptions o = pictureOf(kNanoBox, {70, 50}, 8.0, wish);
   o.lod = LevelOfDetail::kOff;
   return o;
 }
@@ -40,18 +38,14 @@ RenderOptions nanoOptions(const CameraWish& wish = {}) {
 void expectTheVolumesPicture(const VolumeGrid& grid, NanoValues values, const RenderOptions& o,
                              double tolerance) {
   const Image expected = renderVolume(grid.volume, o);
-  double light = 0.0;
-  for (const float v : expected.rgba) light += v;
-  EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+  expectAnyLight(expected);
   const NanoVolume nano = makeNanoVolume(grid, values);
   EXPECT_LE(largestDifference(makeNanoRenderer(nano, {DeviceKind::kCpu})->draw(o), expected),
             tolerance);
 }
 
 TEST(RenderNano, DrawsTheVolumesPicture) {
-  const CameraWish inside{.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
-  for (const CameraWish& wish :
-       {CameraWish{}, CameraWish{.projection = Projection::kOrthographic}, inside})
+  for (const CameraWish& wish : {CameraWish{}, orthographic(), inside()})
     expectTheVolumesPicture(nanoBlobs(), NanoValues::kFloat, nanoOptions(wish), 1e-3);
 }
 
@@ -65,14 +59,8 @@ TEST(RenderNano, AgreesForOtherSteps) {
 
 TEST(RenderNano, StepsOverAllOfAFarEmptySpace) {
   VolumeGrid grid = nanoBlobs();
-  const VolumeGrid other = nanoBlobs({5000, -20, -20});
-  std::vector<BrickInput> bricks;
-  for (const SparseVolume* from : {&std::as_const(grid.volume), &other.volume})
-    for (std::size_t b = 0; b < from->brickCount(); ++b) {
-      BrickInput brick{from->brickCorner(b), {}, from->active[b]};
-      std::copy_n(from->brickValues(b).begin(), kBrickVoxels, brick.values.begin());
-      bricks.push_back(brick);
-    }
+  auto bricks = bricksOf(grid.volume);
+  std::ranges::move(bricksOf(nanoBlobs({5000, -20, -20}).volume), std::back_inserter(bricks));
   grid.volume = makeVolume(std::move(bricks), 0.0f);
   const RenderOptions o =
       nanoOptions({.eye = Vec3{-200, 20, 20}, .center = Vec3{0, 20, 20}, .fov = 20.0});
@@ -95,7 +83,7 @@ TEST(RenderNano, AnEmptyGridIsTransparent) {
   VolumeGrid grid;
   grid.descriptor.transform = uniformTransform(1.0);
   const NanoVolume nano = makeNanoVolume(grid, NanoValues::kFloat);
-  for (const float v : renderNano(nano, nanoOptions()).rgba) ASSERT_EQ(v, 0.0f);
+  expectTransparent(renderNano(nano, nanoOptions()));
 }
 
 }  // namespace

@@ -4,12 +4,10 @@
 // compared with each other.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "esvr/field.h"
 #include "esvr/render.h"
-#include "render/brick_scene.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 #include "render/view.h"
 #include "support/on_threads.h"
 
@@ -36,14 +34,13 @@ double brickAgreement(const SparseVolume& volume, const RenderOptions& o) {
 TEST(RenderVolume, AgreesWithADenseWalk) {
   const auto volume = scattered();
   EXPECT_GE(brickAgreement(volume, optionsFor(volume)), kAskedOfBricks);
-  EXPECT_GE(brickAgreement(volume, optionsFor(volume, {.projection = Projection::kOrthographic})),
-            kAskedOfBricks);
+  EXPECT_GE(brickAgreement(volume, optionsFor(volume, orthographic())), kAskedOfBricks);
 }
 
 TEST(RenderVolume, AgreesAlongAxesWhereSamplesLieOnTheFacesOfBricks) {
   const auto volume = scattered({-16, 8, -24});
   for (const Vec3& from : {Vec3{100, 0, 0}, Vec3{0, 0, -100}, Vec3{0, 100, 0}}) {
-    RenderOptions o = optionsFor(volume, {.projection = Projection::kOrthographic});
+    RenderOptions o = optionsFor(volume, orthographic());
     o.resolution = {48, 48};
     o.camera.height = 96.0;  // a pixel is two voxels wide, so that rays pass through voxels
     o.camera.center = {8.0, 20.0, 0.0};
@@ -66,7 +63,7 @@ TEST(RenderVolume, SlowVoxelsThatAreNoCubesAgreeWithADenseWalk) {
 
 TEST(RenderVolume, CamerasThatAreFarAwaySeeTheVolume) {
   const auto volume = scattered();
-  RenderOptions o = optionsFor(volume, {.projection = Projection::kOrthographic});
+  RenderOptions o = optionsFor(volume, orthographic());
   const Vec3 back = difference(o.camera.eye, o.camera.center);
   o.step = 0.1;
   const Image near = renderVolume(volume, o);
@@ -103,16 +100,15 @@ TEST(RenderVolume, IsTheSameForAnyNumberOfThreads) {
 }
 
 TEST(RenderVolume, NoVoxelsGiveAnEmptyPicture) {
-  for (const float v : renderVolume(SparseVolume{}, optionsFor(scattered())).rgba)
-    ASSERT_EQ(v, 0.0f);
+  expectTransparent(renderVolume(SparseVolume{}, optionsFor(scattered())));
 }
 
 TEST(Renderers, AgreeOnSmoothFields) {
   // For a blob with scale s, trilinear interpolation errs by up to 3/8 of the second derivative,
   // about 2 I / s^2. This is 0.7 % of the intensity for s = 10, and more for smaller scales. An
   // opacity of 1/20 reduces it, and most errors have the same sign, which gives 45 dB.
-  Field field = randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f});
-  for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+  const Field field =
+      withoutNegatives(randomField({.count = 25, .smallest = 8.0, .aspect = 1.5, .kappa = 0.0f}));
   const SparseVolume volume = revoxelise(field, {.threshold = -1.0f});
   RenderOptions o = optionsFor(volume);
   o.transfer = rescaled(o.transfer, {0.0f, 5.0f});

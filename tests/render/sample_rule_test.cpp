@@ -1,14 +1,10 @@
-// Plan: the rule for samples is tested on sequences of values: parts that are joined are as good as
-// one part, and it does not matter which samples in empty space are left out. Pictures show what it
-// is for: a tilted slab and a tilted cube have faces whose true picture is constant along a face,
-// so the variance of their pixels measures the stripes that sampling leaves there. Pre-integration
-// must leave a hundredth of the power that post-classification leaves; with short steps both draw
-// the same picture.
+// Plan: parts of a sequence of samples that are joined are as good as one part. A tilted slab and a
+// tilted cube have faces whose true picture is constant along a face, so the variance of their pixels
+// measures the stripes that sampling leaves there: pre-integration must leave a hundredth of the power
+// that post-classification leaves, and with short steps both draw the same picture.
 //
-// The light of a surface follows the definition in render.h: a plane of known gradient, seen
-// straight on and tilted, has the diffuse part and the highlight that are computed here in float64.
-// Gradients agree with the derivatives of a quadratic function. The cells of a field and volumes
-// give the same shaded pictures. What cannot be shaded is refused.
+// The light of a surface follows the definition in render.h, computed here in float64, and gradients
+// are the derivatives of a quadratic function.
 #include "render/sample_rule.h"
 
 #include <gtest/gtest.h>
@@ -23,8 +19,8 @@
 #include "esvr/image.h"
 #include "esvr/render.h"
 #include "field/random_field.h"
-#include "render/brick_scene.h"
 #include "render/reference_picture.h"
+#include "render/scenes.h"
 
 namespace esvr::test {
 namespace {
@@ -143,18 +139,10 @@ constexpr double kLessPower = 100.0;
 
 /// A volume whose voxels have the values of a function of their places.
 template <class Value>
-SparseVolume sampled(float background, Value&& value) {
-  std::vector<BrickInput> bricks;
-  for (int b = 0; b < 6 * 6 * 6; ++b) {
-    BrickInput brick{Coord{b / 36, b / 6 % 6, b % 6} * kBrickSide, {}, {}};
-    for (int i = 0; i < kBrickVoxels; ++i) {
-      const Coord at = brick.corner + Coord{i / 64, i / 8 % 8, i % 8};
-      brick.values[std::size_t(i)] = float(value(Vec3{double(at.x), double(at.y), double(at.z)}));
-    }
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), background);
+SparseVolume sampled(float background, const Value& value) {
+  return cubeOf(kSide / kBrickSide, background, [&](Coord at) {
+    return value(Vec3{double(at.x), double(at.y), double(at.z)});
+  });
 }
 
 /// A slab of 20 voxels whose values fall from 1 to 0 within 3 voxels on both sides.
@@ -179,10 +167,8 @@ SparseVolume tiltedCube() {
 
 /// The picture of a square of some voxels in the middle of the volume.
 RenderOptions closeUp(double voxels, const TransferFunction& transfer) {
-  RenderOptions o;
-  o.resolution = {64, 64};
-  o.camera = fitCamera({{0, 0, 0}, {kSide - 1, kSide - 1, kSide - 1}},
-                       {.projection = Projection::kOrthographic}, o.resolution);
+  RenderOptions o =
+      pictureOf({{0, 0, 0}, {kSide - 1, kSide - 1, kSide - 1}}, {64, 64}, 1.0, orthographic());
   o.camera.center = {kMiddle, kMiddle, kMiddle};
   o.camera.eye = {kMiddle, kMiddle, 100.37};
   o.camera.up = {0, 1, 0};
@@ -338,12 +324,7 @@ TEST(Classification, BothRulesAgreeAtShortSteps) {
 
 TEST(Classification, BricksThatHoldOnlyTheBackgroundChangeNothing) {
   const SparseVolume volume = randomBricks({{0, 0, 0}, {16, 8, 24}}, 11, 0.5f);
-  std::vector<BrickInput> bricks;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    BrickInput brick{volume.brickCorner(b), {}, volume.active[b]};
-    std::copy_n(volume.brickValues(b).begin(), kBrickVoxels, brick.values.begin());
-    bricks.push_back(brick);
-  }
+  auto bricks = bricksOf(volume);
   for (const Coord corner : {Coord{8, 0, 0}, Coord{8, 8, 16}, Coord{0, 0, 8}, Coord{24, 8, 24}}) {
     bricks.push_back({corner, {}, {}});
     bricks.back().values.fill(0.5f);
@@ -416,17 +397,7 @@ TEST(Shading, PlacesWithoutAGradientAreLitFromTheFront) {
 
 /// A slope: values grow along x and z, so that its surface is tilted by 45 degrees.
 SparseVolume slope() {
-  std::vector<BrickInput> bricks;
-  for (int n = 0; n < 64; ++n) {
-    BrickInput brick{Coord{n / 16, n / 4 % 4, n % 4} * kBrickSide, {}, {}};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const Coord c = brick.corner + voxelLocal(v);
-      brick.values[std::size_t(v)] = 1.0f + 0.1f * float(c.x + c.z);
-    }
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), 0.0f);
+  return cubeOf(4, 0.0f, [](Coord at) { return 1.0f + 0.1f * float(at.x + at.z); });
 }
 
 RenderOptions seenAlongX(const Vec3& light) {
@@ -457,11 +428,7 @@ TEST(Shading, OfATiltedPlaneIsThatOfItsNormal) {
 
 TEST(Shading, OfCellsIsThatOfVolumes) {
   const Field field = randomField({.count = 200});
-  RenderOptions o;
-  o.resolution = {60, 45};
-  o.camera = fitCamera({{0, 0, 0}, {39, 39, 39}}, {}, o.resolution);
-  o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
-  o.opacityLength = 4.0;
+  RenderOptions o = pictureOf(kFieldBox, {60, 45}, 4.0);
   const Image unlit = renderField(field, o);
   o.shading = Shading{};
   for (const auto classification : {Classification::kPreIntegrated, Classification::kPost}) {

@@ -193,8 +193,7 @@ def tiff(path, data, **options):
     return path
 
 
-def test_pages_of_several_calls(tmp_path):
-    tifffile = pytest.importorskip("tifffile")
+def test_pages_of_several_calls(tmp_path, tifffile):
     with tifffile.TiffWriter(tmp_path / "a.tif") as file:
         for page in ramp():
             file.write(page, contiguous=False)
@@ -229,8 +228,7 @@ def test_white_is_least_and_colors(tmp_path):
     assert np.array_equal(convert(path, "--channel", 2).values[0], ramp()[0] + 2000)
 
 
-def test_big_endian_floats_with_a_predictor_are_refused(tmp_path):
-    gdal = pytest.importorskip("osgeo.gdal")
+def test_big_endian_floats_with_a_predictor_are_refused(tmp_path, gdal):
     options = ["COMPRESS=LZW", "PREDICTOR=3", "ENDIANNESS=BIG"]
     data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_Float32, options)
     data.GetRasterBand(1).WriteArray(ramp("f4")[0])
@@ -314,9 +312,8 @@ def test_bytes_of_mrc(tmp_path):
     assert np.array_equal(convert(path).values, data.view("u1"))
 
 
-def test_big_endian_and_stacks_of_mrc(tmp_path):
+def test_big_endian_and_stacks_of_mrc(tmp_path, mrcfile):
     assert np.array_equal(convert(mrc(tmp_path / "a.mrc", ramp("i2"), ">")).values, ramp())
-    mrcfile = pytest.importorskip("mrcfile")
     with mrcfile.new(tmp_path / "s.mrcs") as file:
         file.set_data(np.stack([ramp("f4"), ramp("f4") + 1000]))
     assert np.array_equal(convert(tmp_path / "s.mrcs", "--channel", 1).values, ramp() + 1000)
@@ -483,9 +480,8 @@ def test_labels_times_and_groups_of_netcdf(weather):
     assert convert(weather("f4", group="model/run")).values[3, 4, 5] == 346
 
 
-def test_truth_and_complex_values_that_netcdf_leaves_out(tmp_path):
+def test_truth_and_complex_values_that_netcdf_leaves_out(tmp_path, h5py):
     pytest.importorskip("netCDF4")
-    h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "a.nc", "w") as file:
         file["mask"] = ramp() > 200
     made = convert(tmp_path / "a.nc")
@@ -498,8 +494,7 @@ def test_truth_and_complex_values_that_netcdf_leaves_out(tmp_path):
     refused(esvr.BadInput, "c.h5", tmp_path / "c.h5", "--dataset", "c")
 
 
-def test_coordinates_of_two_dimensions(tmp_path):
-    netcdf = pytest.importorskip("netCDF4")
+def test_coordinates_of_two_dimensions(tmp_path, netcdf):
     with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
         for dim, size in zip("zyx", (4, 5, 6)):
             file.createDimension(dim, size)
@@ -517,8 +512,7 @@ def test_places_of_netcdf(weather):
     assert any("steps of the axis z differ" in text for text in convert(weather("f4", coordinates=where)).warnings)
 
 
-def test_several_variables_are_listed(tmp_path):
-    netcdf = pytest.importorskip("netCDF4")
+def test_several_variables_are_listed(tmp_path, netcdf):
     with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
         for dim, size in zip("zyx", (4, 5, 6)):
             file.createDimension(dim, size)
@@ -528,9 +522,8 @@ def test_several_variables_are_listed(tmp_path):
     assert convert(tmp_path / "a.nc", "--dataset", "v").values[0, 0, 0] == 1001
 
 
-def test_members_and_bands_are_channels(tmp_path):
+def test_members_and_bands_are_channels(tmp_path, netcdf):
     """As ERA5 and rioxarray write them; a dimension that nobody knows is taken for the one of space that is left, with a warning."""
-    netcdf = pytest.importorskip("netCDF4")
     for name in ("number", "band", "run"):
         with netcdf.Dataset(tmp_path / f"{name}.nc", "w") as file:
             for dim, size in zip((name, "latitude", "longitude"), (4, 5, 6)):
@@ -548,8 +541,7 @@ def test_what_matlab_keeps_for_itself(tmp_path):
     assert np.array_equal(convert(tmp_path / "a.mat").values, ramp())
 
 
-def test_dimensions_in_any_order(tmp_path):
-    netcdf = pytest.importorskip("netCDF4")
+def test_dimensions_in_any_order(tmp_path, netcdf):
     with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
         for dim, size in zip(("lev", "lat", "lon"), (4, 5, 6)):
             file.createDimension(dim, size)
@@ -571,8 +563,7 @@ def test_formats_within_hdf5_are_refused(tmp_path, array, program):
     refused(esvr.BadInput, f"HDF5 file of {program}", tmp_path / "a.h5")
 
 
-def test_axes_without_names_of_hdf5(tmp_path):
-    h5py = pytest.importorskip("h5py")
+def test_axes_without_names_of_hdf5(tmp_path, h5py):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["a"] = np.stack([ramp(), ramp() + 1000])
         file["a"].attrs["axistags"] = json.dumps({"axes": [{"key": key} for key in "czyx"]})
@@ -593,8 +584,7 @@ def test_zarr_3_is_named_and_not_written_into(tmp_path):
 
 
 @pytest.mark.parametrize("separator", [".", "/"])
-def test_chunks_elsewhere_are_refused(tmp_path, separator):
-    zarr = pytest.importorskip("zarr")
+def test_chunks_elsewhere_are_refused(tmp_path, separator, zarr):
     zarr.open(str(tmp_path / "a.zarr"), mode="w", shape=(4, 5, 6), chunks=(2, 5, 6), dtype="u2", dimension_separator=separator)[:] = ramp()
     header = tmp_path / "a.zarr/.zarray"
     said = json.loads(header.read_text())
@@ -603,8 +593,7 @@ def test_chunks_elsewhere_are_refused(tmp_path, separator):
     refused(esvr.BadInput, "chunks are stored as", tmp_path / "a.zarr")
 
 
-def test_missing_chunks(tmp_path):
-    zarr = pytest.importorskip("zarr")
+def test_missing_chunks(tmp_path, zarr):
     for fill in 7, None:
         folder = tmp_path / f"{fill}.zarr"
         zarr.open(str(folder), mode="w", shape=(4, 5, 6), chunks=(2, 5, 6), dtype="u2", fill_value=fill)[:] = ramp()
@@ -649,8 +638,7 @@ def test_channels_and_labels_of_ome_zarr(tmp_path):
     refused(esvr.UsageError, r"channel: 2 \(DAPI, GFP\)|c: 2 \(DAPI, GFP\)", tmp_path / "a.zarr")
 
 
-def test_arrays_of_zarr_are_listed(tmp_path):
-    zarr = pytest.importorskip("zarr")
+def test_arrays_of_zarr_are_listed(tmp_path, zarr):
     root = zarr.open_group(str(tmp_path / "a.zarr"), mode="w")
     for name in "ab":
         root.create_dataset(name, data=ramp())
@@ -732,8 +720,7 @@ def test_a_tilted_gantry_shears(tmp_path):
     assert np.allclose(made.matrix, matrix, atol=1e-5)
 
 
-def test_frames_of_one_file(tmp_path):
-    pydicom = pytest.importorskip("pydicom")
+def test_frames_of_one_file(tmp_path, pydicom):
     from pydicom.dataset import Dataset
 
     def change(k, data):
@@ -756,8 +743,7 @@ def test_frames_of_one_file(tmp_path):
     assert np.allclose(made.matrix, [[-0.5, 0, 0, -1], [0, -0.75, 0, -2], [0, 0, 2.5, 22.5], [0, 0, 0, 1]])
 
 
-def test_files_without_a_preamble(tmp_path):
-    pydicom = pytest.importorskip("pydicom")
+def test_files_without_a_preamble(tmp_path, pydicom):
     folder = dicom(tmp_path / "s", ramp())
     for path in folder.iterdir():
         data = pydicom.dcmread(path)
@@ -809,11 +795,10 @@ def test_integers_that_no_grid_holds_are_refused(tmp_path):
     refused(esvr.BadInput, "beyond 2\\^24", tmp_path / "b.npy", "--as", "float")
 
 
-def test_doubles_hold_larger_integers_and_fill_values_do_not_count(tmp_path):
+def test_doubles_hold_larger_integers_and_fill_values_do_not_count(tmp_path, netcdf):
     np.save(tmp_path / "a.npy", ramp("i8") + 2 ** 40)
     made = convert(tmp_path / "a.npy", "--as", "double")
     assert made.grid.value_type == "double" and np.array_equal(made.values, ramp("i8") + 2 ** 40)
-    netcdf = pytest.importorskip("netCDF4")
     with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
         for dim, size in zip("zyx", (4, 5, 6)):
             file.createDimension(dim, size)

@@ -177,8 +177,7 @@ def test_noise_after_the_first_bytes(tmp_path, capfd, name, magic):
     assert attempt(tmp_path / name, capfd) == 3
 
 
-def test_damaged_zarr(tmp_path, capfd):
-    zarr = pytest.importorskip("zarr")
+def test_damaged_zarr(tmp_path, capfd, zarr):
     zarr.open(str(tmp_path / "a.zarr"), mode="w", shape=(4, 5, 6), chunks=(2, 5, 6), dtype="u2")[:] = ramp()
     assert attempt(tmp_path / "a.zarr", capfd) == 0
     chunk = (tmp_path / "a.zarr/1.0.0").read_bytes()
@@ -189,8 +188,7 @@ def test_damaged_zarr(tmp_path, capfd):
     assert attempt(tmp_path / "a.zarr", capfd) == 3
 
 
-def test_cut_edge_chunks_of_zarr(tmp_path, capfd):
-    zarr = pytest.importorskip("zarr")
+def test_cut_edge_chunks_of_zarr(tmp_path, capfd, zarr):
     zarr.open(str(tmp_path / "a.zarr"), mode="w", shape=(3, 5, 6), chunks=(2, 5, 6), dtype="u2", compressor=None)[:] = ramp()[:3]
     (tmp_path / "a.zarr/1.0.0").write_bytes(ramp()[2].tobytes())
     assert attempt(tmp_path / "a.zarr", capfd) == 3

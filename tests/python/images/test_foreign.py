@@ -25,8 +25,7 @@ def same(made, values, matrix=None, atol=1e-5):
 # -- NIfTI and Analyze by nibabel --------------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["u1", "i1", "i2", "u2", "f4", "f8", "i4"])
 @pytest.mark.parametrize("name", ["a.nii", "a.nii.gz", "a.img"])
-def test_nifti_by_nibabel(tmp_path, kind, name):
-    nibabel = pytest.importorskip("nibabel")
+def test_nifti_by_nibabel(tmp_path, kind, name, nibabel):
     values = ramp(kind if kind not in ("u1", "i1") else "u2") % (100 if kind in ("u1", "i1") else 5000)
     pair = nibabel.Nifti1Pair if name.endswith("img") else nibabel.Nifti1Image
     nibabel.save(pair(values.astype(kind).transpose(2, 1, 0), tilted()), tmp_path / name)
@@ -36,8 +35,7 @@ def test_nifti_by_nibabel(tmp_path, kind, name):
     assert made.unit == "mm"
 
 
-def test_nifti2_big_endian_in_microns_by_nibabel(tmp_path):
-    nibabel = pytest.importorskip("nibabel")
+def test_nifti2_big_endian_in_microns_by_nibabel(tmp_path, nibabel):
     header = nibabel.Nifti2Header(endianness=">")
     header.set_data_dtype(">i2")
     image = nibabel.Nifti2Image(ramp("i2").transpose(2, 1, 0), tilted(), header=header)
@@ -47,8 +45,7 @@ def test_nifti2_big_endian_in_microns_by_nibabel(tmp_path):
 
 
 @pytest.mark.parametrize("is_left_handed", [False, True])
-def test_qform_alone_by_nibabel(tmp_path, is_left_handed):
-    nibabel = pytest.importorskip("nibabel")
+def test_qform_alone_by_nibabel(tmp_path, is_left_handed, nibabel):
     matrix = tilted() @ (np.diag([-1.0, 1, 1, 1]) if is_left_handed else np.eye(4))
     image = nibabel.Nifti1Image(ramp("i2").transpose(2, 1, 0), None)
     image.header.set_qform(matrix, 1)
@@ -59,9 +56,8 @@ def test_qform_alone_by_nibabel(tmp_path, is_left_handed):
     assert (np.linalg.det(made.matrix) < 0) == is_left_handed
 
 
-def test_analyze_of_spm_by_nibabel(tmp_path):
+def test_analyze_of_spm_by_nibabel(tmp_path, nibabel):
     """SPM keeps a factor where other programs have nothing."""
-    nibabel = pytest.importorskip("nibabel")
     image = nibabel.Spm99AnalyzeImage(ramp("f4").transpose(2, 1, 0) / 7, np.diag([-2, 2, 3, 1.0]))
     image.set_data_dtype("i2")
     image.to_filename(tmp_path / "a.img")
@@ -70,8 +66,7 @@ def test_analyze_of_spm_by_nibabel(tmp_path):
     assert abs(stored - ramp() / 7).max() < 0.01
 
 
-def test_analyze_by_nibabel(tmp_path):
-    nibabel = pytest.importorskip("nibabel")
+def test_analyze_by_nibabel(tmp_path, nibabel):
     image = nibabel.AnalyzeImage(ramp("i2").transpose(2, 1, 0), np.diag([0.5, 0.75, 2, 1]))
     nibabel.save(image, tmp_path / "a.img")
     made = convert(tmp_path / "a.hdr")
@@ -79,8 +74,7 @@ def test_analyze_by_nibabel(tmp_path):
     assert np.allclose(made.spacing, [0.5, 0.75, 2])
 
 
-def test_times_by_nibabel(tmp_path):
-    nibabel = pytest.importorskip("nibabel")
+def test_times_by_nibabel(tmp_path, nibabel):
     values = np.stack([ramp("i2") + 1000 * t for t in range(3)])
     nibabel.save(nibabel.Nifti1Image(values.transpose(3, 2, 1, 0), tilted()), tmp_path / "a.nii.gz")
     same(convert(tmp_path / "a.nii.gz", "--time", 2), values[2], tilted())
@@ -161,8 +155,7 @@ def test_metaimage_by_hand_as_itk_reads_it(tmp_path):
 # -- MRC by mrcfile ----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["i1", "i2", "u2", "f4", "f2"])
 @pytest.mark.parametrize("compression", [None, "gzip"])
-def test_mrc_by_mrcfile(tmp_path, kind, compression):
-    mrcfile = pytest.importorskip("mrcfile")
+def test_mrc_by_mrcfile(tmp_path, kind, compression, mrcfile):
     values = (ramp() % 100 - 50).astype(kind) if kind == "i1" else ramp(kind)
     with mrcfile.new(tmp_path / "a.mrc", compression=compression) as file:
         file.set_data(values)
@@ -173,8 +166,7 @@ def test_mrc_by_mrcfile(tmp_path, kind, compression):
     assert made.unit == "angstrom"
 
 
-def test_mrc_axes_and_starts_by_mrcfile(tmp_path):
-    mrcfile = pytest.importorskip("mrcfile")
+def test_mrc_axes_and_starts_by_mrcfile(tmp_path, mrcfile):
     with mrcfile.new(tmp_path / "a.map") as file:
         file.set_data(ramp("f4"))
         file.header.mapc, file.header.mapr, file.header.maps = 3, 2, 1
@@ -187,8 +179,7 @@ def test_mrc_axes_and_starts_by_mrcfile(tmp_path):
     assert np.allclose(made.matrix[:3, 3], [7 * 2.0, 6 * 0.75, 5 * 0.5])
 
 
-def test_oblique_cells_by_mrcfile(tmp_path):
-    mrcfile = pytest.importorskip("mrcfile")
+def test_oblique_cells_by_mrcfile(tmp_path, mrcfile):
     with mrcfile.new(tmp_path / "a.mrc") as file:
         file.set_data(ramp("f4"))
         file.set_extended_header(np.zeros(77, "V16"))
@@ -206,8 +197,7 @@ def test_oblique_cells_by_mrcfile(tmp_path):
 # -- TIFF by tifffile, GDAL and Pillow -----------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["u1", "i1", "u2", "i2", "u4", "i4", "f2", "f4", "f8"])
 @pytest.mark.parametrize("order", ["<", ">"])
-def test_types_by_tifffile(tmp_path, kind, order):
-    tifffile = pytest.importorskip("tifffile")
+def test_types_by_tifffile(tmp_path, kind, order, tifffile):
     values = (ramp() % 100).astype(kind) if kind in ("u1", "i1") else ramp(kind)
     tifffile.imwrite(tmp_path / "a.tif", values, byteorder=order, metadata={"axes": "ZYX"}, photometric="minisblack")
     same(convert(tmp_path / "a.tif"), values)
@@ -215,8 +205,7 @@ def test_types_by_tifffile(tmp_path, kind, order):
 
 @pytest.mark.parametrize("options", [dict(tile=(16, 16)), dict(compression="zlib", predictor=True), dict(bigtiff=True),
                                      dict(rowsperstrip=2), dict(compression="zlib", tile=(32, 16))])
-def test_layouts_by_tifffile(tmp_path, options):
-    tifffile = pytest.importorskip("tifffile")
+def test_layouts_by_tifffile(tmp_path, options, tifffile):
     values = ramp("u2", (40, 35, 3))
     try:
         tifffile.imwrite(tmp_path / "a.tif", values, metadata={"axes": "ZYX"}, photometric="minisblack", **options)
@@ -225,8 +214,7 @@ def test_layouts_by_tifffile(tmp_path, options):
     same(convert(tmp_path / "a.tif"), values)
 
 
-def test_imagej_hyperstack_by_tifffile(tmp_path):
-    tifffile = pytest.importorskip("tifffile")
+def test_imagej_hyperstack_by_tifffile(tmp_path, tifffile):
     values = np.stack([np.stack([ramp() + 1000 * c + 4000 * t for c in range(2)], axis=1) for t in range(3)])
     tifffile.imwrite(tmp_path / "a.tif", values, imagej=True, resolution=(2.0, 4.0),
                      metadata={"axes": "TZCYX", "spacing": 3.0, "unit": "um"})
@@ -235,8 +223,7 @@ def test_imagej_hyperstack_by_tifffile(tmp_path):
     assert np.allclose(made.spacing, [0.5, 0.25, 3])
 
 
-def test_one_page_for_all_slices_by_tifffile(tmp_path):
-    tifffile = pytest.importorskip("tifffile")
+def test_one_page_for_all_slices_by_tifffile(tmp_path, tifffile):
     tifffile.imwrite(tmp_path / "a.tif", ramp(), imagej=True, metadata={"axes": "ZYX"}, contiguous=True)
     with tifffile.TiffFile(tmp_path / "a.tif") as file:
         second = file.pages[0].tags["ImageWidth"].offset - 2 + 2 + 12 * len(file.pages[0].tags)
@@ -247,8 +234,7 @@ def test_one_page_for_all_slices_by_tifffile(tmp_path):
 
 
 @pytest.mark.parametrize("axes", ["CZYX", "ZCYX", "TCZYX"])
-def test_ome_by_tifffile(tmp_path, axes):
-    tifffile = pytest.importorskip("tifffile")
+def test_ome_by_tifffile(tmp_path, axes, tifffile):
     planes = {"c": 2, "z": 4, "t": 2}
     shape = [planes[a.lower()] for a in axes[:-2]] + [5, 6]
     values = np.arange(np.prod(shape), dtype="u2").reshape(shape) + 1
@@ -270,8 +256,7 @@ def test_volumes_in_tiles_by_tifffile(tmp_path):
     same(convert(tmp_path / "a.tif"), values)
 
 
-def test_colors_of_slices_by_tifffile(tmp_path):
-    tifffile = pytest.importorskip("tifffile")
+def test_colors_of_slices_by_tifffile(tmp_path, tifffile):
     colors = np.stack([ramp(), ramp() + 1000, ramp() + 2000], axis=-1)
     tifffile.imwrite(tmp_path / "a.tif", colors, photometric="rgb")
     tifffile.imwrite(tmp_path / "b.tif", np.moveaxis(colors, -1, 1), photometric="rgb", planarconfig="separate")
@@ -279,8 +264,7 @@ def test_colors_of_slices_by_tifffile(tmp_path):
     same(convert(tmp_path / "b.tif", "--channel", 1), ramp() + 1000)
 
 
-def test_pyramids_and_images_of_ome_by_tifffile(tmp_path):
-    tifffile = pytest.importorskip("tifffile")
+def test_pyramids_and_images_of_ome_by_tifffile(tmp_path, tifffile):
     values, other = ramp("u2", (64, 64, 4)), ramp("f4", (8, 7, 3))
     with tifffile.TiffWriter(tmp_path / "a.ome.tif", ome=True) as file:
         file.write(values, subifds=1, photometric="minisblack", metadata={"axes": "ZYX", "PhysicalSizeX": 0.5, "PhysicalSizeZ": 2})
@@ -294,8 +278,7 @@ def test_pyramids_and_images_of_ome_by_tifffile(tmp_path):
         assert np.allclose(made.spacing, spacing)
 
 
-def test_ome_in_two_files_by_tifffile(tmp_path):
-    tifffile = pytest.importorskip("tifffile")
+def test_ome_in_two_files_by_tifffile(tmp_path, tifffile):
     for c in range(2):
         planes = "".join(f'<TiffData IFD="{z}" FirstZ="{z}" FirstC="{k}" PlaneCount="1"><UUID FileName="c{k}.ome.tif">urn:uuid:{k}'
                          "</UUID></TiffData>" for k in range(2) for z in range(4))
@@ -312,9 +295,8 @@ def test_ome_in_two_files_by_tifffile(tmp_path):
 @pytest.mark.parametrize("options", [["COMPRESS=LZW"], ["COMPRESS=LZW", "PREDICTOR=2"], ["COMPRESS=DEFLATE", "TILED=YES"],
                                      ["COMPRESS=ZSTD"], ["COMPRESS=LZMA"], ["COMPRESS=PACKBITS"], ["NBITS=12"],
                                      ["NBITS=10", "COMPRESS=LZW"], ["SPARSE_OK=TRUE"], ["ENDIANNESS=BIG", "COMPRESS=LZW"]])
-def test_codes_by_gdal(tmp_path, options):
+def test_codes_by_gdal(tmp_path, options, gdal):
     pytest.importorskip("tifffile")
-    gdal = pytest.importorskip("osgeo.gdal")
     values = ramp("u2")[0:1] % 1000
     data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16, options)
     data.GetRasterBand(1).WriteArray(values[0])
@@ -323,9 +305,8 @@ def test_codes_by_gdal(tmp_path, options):
     same(convert(tmp_path / "a.tif"), values)
 
 
-def test_float_predictor_missing_and_scale_by_gdal(tmp_path):
+def test_float_predictor_missing_and_scale_by_gdal(tmp_path, gdal):
     pytest.importorskip("tifffile")
-    gdal = pytest.importorskip("osgeo.gdal")
     values = ramp("f4")[0] / 4
     values[0, 0] = -9999
     data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_Float32, ["COMPRESS=LZW", "PREDICTOR=3"])
@@ -407,8 +388,7 @@ def test_metaimage_by_vtk(tmp_path, monkeypatch, is_packed):
 
 
 # -- HDF5 and netCDF -----------------------------------------------------------------------------------------------------
-def test_hdf5_by_h5py(tmp_path):
-    h5py = pytest.importorskip("h5py")
+def test_hdf5_by_h5py(tmp_path, h5py):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         chunked = file.create_dataset("volumes/raw", data=ramp(">u2"), chunks=(2, 3, 3), compression="gzip", shuffle=True)
         chunked.attrs["element_size_um"] = [2.0, 0.75, 0.5]
@@ -416,9 +396,8 @@ def test_hdf5_by_h5py(tmp_path):
     same(made, ramp(), np.diag([0.5, 0.75, 2, 1]))
 
 
-def test_hdf5_whose_numbers_are_elsewhere_by_h5py(tmp_path, monkeypatch):
+def test_hdf5_whose_numbers_are_elsewhere_by_h5py(tmp_path, monkeypatch, h5py):
     """HDF5 takes what is not there for the fill value."""
-    h5py = pytest.importorskip("h5py")
     monkeypatch.chdir(tmp_path)
     layout = h5py.VirtualLayout((4, 5, 6), "u2")
     layout[:] = h5py.VirtualSource("source.h5", "d", (4, 5, 6))
@@ -440,8 +419,7 @@ def test_hdf5_whose_numbers_are_elsewhere_by_h5py(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["f2", "f4", "f8", "i8", "u8", "bool"])
-def test_hdf5_types_by_h5py(tmp_path, kind):
-    h5py = pytest.importorskip("h5py")
+def test_hdf5_types_by_h5py(tmp_path, kind, h5py):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["a"] = (ramp() > 200) if kind == "bool" else ramp(kind)
     made = convert(tmp_path / "a.h5")
@@ -449,8 +427,7 @@ def test_hdf5_types_by_h5py(tmp_path, kind):
     same(made, (ramp() > 200) if kind == "bool" else ramp(kind))
 
 
-def test_hdf5_scales_by_h5py(tmp_path):
-    h5py = pytest.importorskip("h5py")
+def test_hdf5_scales_by_h5py(tmp_path, h5py):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["t"] = np.stack([ramp(), ramp() + 1000])
         for k, (name, size, step) in enumerate([("time", 2, 1.0), ("z", 4, 2.0), ("y", 5, 0.75), ("x", 6, 0.5)]):
@@ -464,8 +441,7 @@ def test_hdf5_scales_by_h5py(tmp_path):
 
 
 @pytest.mark.parametrize("form", ["NETCDF4", "NETCDF4_CLASSIC", "NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT_DATA"])
-def test_netcdf_by_netcdf4(tmp_path, form):
-    netcdf = pytest.importorskip("netCDF4")
+def test_netcdf_by_netcdf4(tmp_path, form, netcdf):
     with netcdf.Dataset(tmp_path / "a.nc", "w", format=form) as file:
         for name, size in (("level", 4), ("lat", 5), ("lon", 6)):
             file.createDimension(name, None if name == "level" else size)
@@ -481,8 +457,7 @@ def test_netcdf_by_netcdf4(tmp_path, form):
     assert made.grid.metadata["value_unit"] == "K"
 
 
-def test_netcdf_by_xarray(tmp_path):
-    xarray = pytest.importorskip("xarray")
+def test_netcdf_by_xarray(tmp_path, xarray):
     data = xarray.Dataset({"t": (("time", "z", "y", "x"), np.stack([ramp("f4"), ramp("f4") + 1000]))}, coords={
         "time": np.array(["2020-01-01", "2020-01-02"], "M8[ns]"), "z": ("z", np.arange(4) * 100.0, {"units": "m"}),
         "y": ("y", 5000.0 - np.arange(5) * 1000, {"units": "m"}), "x": ("x", np.arange(6.0) * 2, {"units": "km"})})
@@ -497,26 +472,23 @@ def test_netcdf_by_xarray(tmp_path):
 # -- Zarr ----------------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("separator", [".", "/"])
 @pytest.mark.parametrize("order", ["C", "F"])
-def test_zarr_by_zarr(tmp_path, separator, order):
-    zarr = pytest.importorskip("zarr")
+def test_zarr_by_zarr(tmp_path, separator, order, zarr):
     array = zarr.open(str(tmp_path / "a.zarr"), mode="w", shape=(4, 5, 6), chunks=(3, 2, 4), dtype=">u2", order=order,
                       dimension_separator=separator)
     array[:] = ramp()
     same(convert(tmp_path / "a.zarr"), ramp())
 
 
-def test_zarr_by_xarray(tmp_path):
+def test_zarr_by_xarray(tmp_path, xarray):
     pytest.importorskip("zarr")
-    xarray = pytest.importorskip("xarray")
     data = xarray.Dataset({"t": (("z", "y", "x"), ramp("f4"))}, coords={"x": ("x", np.arange(6) * 0.5, {"units": "mm"}), "y": (
         "y", np.arange(5) * 0.75, {"units": "mm"}), "z": ("z", np.arange(4) * 2.0, {"units": "mm"})})
     data.to_zarr(tmp_path / "a.zarr")
     same(convert(tmp_path / "a.zarr"), ramp(), np.diag([0.5, 0.75, 2, 1]))
 
 
-def test_packed_zarr_by_xarray(tmp_path):
+def test_packed_zarr_by_xarray(tmp_path, xarray):
     pytest.importorskip("zarr")
-    xarray = pytest.importorskip("xarray")
     values = 250 + ramp("f8") / 10
     values[:, 0] = np.nan
     xarray.Dataset({"t": (("z", "y", "x"), values)}).to_zarr(tmp_path / "a.zarr", encoding={
@@ -527,8 +499,7 @@ def test_packed_zarr_by_xarray(tmp_path):
     assert np.allclose(made.values[made.active], again[made.active])
 
 
-def test_zarr_zip_by_zarr(tmp_path):
-    zarr = pytest.importorskip("zarr")
+def test_zarr_zip_by_zarr(tmp_path, zarr):
     with zarr.ZipStore(str(tmp_path / "a.zarr.zip"), mode="w") as store:
         zarr.create(shape=(4, 5, 6), chunks=(2, 5, 6), dtype="u2", store=store)[:] = ramp()
     same(convert(tmp_path / "a.zarr.zip"), ramp())
@@ -625,9 +596,8 @@ def test_npy_by_numpy(tmp_path, is_fortran):
     same(convert(tmp_path / "a.npy"), ramp())
 
 
-def test_tomograms_of_nuclear_medicine_by_pydicom(tmp_path):
+def test_tomograms_of_nuclear_medicine_by_pydicom(tmp_path, pydicom):
     """Frames have their place in the description of the detector."""
-    pydicom = pytest.importorskip("pydicom")
 
     def change(_, data):
         detector = pydicom.Dataset()
@@ -646,8 +616,7 @@ def test_palettes_of_dicom_by_pydicom(tmp_path):
     same(convert(folder, "--stored"), ramp("u1")[:1])
 
 
-def test_masks_of_tiff_by_gdal(tmp_path):
-    gdal = pytest.importorskip("osgeo.gdal")
+def test_masks_of_tiff_by_gdal(tmp_path, gdal):
     gdal.UseExceptions()
     gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", "YES")
     file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16)
@@ -668,15 +637,13 @@ def test_ome_whose_description_is_elsewhere(tmp_path):
 
 
 @pytest.mark.parametrize("planar", ["contig", "separate"])
-def test_colors_from_below_by_tifffile(tmp_path, planar):
-    tifffile = pytest.importorskip("tifffile")
+def test_colors_from_below_by_tifffile(tmp_path, planar, tifffile):
     colors = np.stack([ramp()[0] + 1000 * k for k in range(3)], axis=-1 if planar == "contig" else 0)
     tifffile.imwrite(tmp_path / "a.tif", colors, photometric="rgb", planarconfig=planar, metadata=None, extratags=[(274, 3, 1, 4, True)])
     same(convert(tmp_path / "a.tif", "--channel", 2), ramp()[:1, ::-1] + 2000)
 
 
-def test_as_many_rows_as_colors_by_gdal(tmp_path):
-    gdal = pytest.importorskip("osgeo.gdal")
+def test_as_many_rows_as_colors_by_gdal(tmp_path, gdal):
     gdal.UseExceptions()
     file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 3, 3, gdal.GDT_UInt16, ["COMPRESS=LZW", "INTERLEAVE=PIXEL"])
     for k in range(3):

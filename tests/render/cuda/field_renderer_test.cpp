@@ -13,25 +13,14 @@
 #include "esvr/error.h"
 #include "esvr/render.h"
 #include "field/random_field.h"
+#include "render/reference_picture.h"
+#include "render/scenes.h"
 #include "support/on_device.h"
 
 namespace esvr::test {
 namespace {
 
 constexpr double kAsked = 1.0 / 255.0;
-constexpr Box kFieldBox{{0, 0, 0}, {39, 39, 39}};
-
-CameraWish orthographic() { return {.projection = Projection::kOrthographic}; }
-CameraWish inside() {
-  return {.eye = Vec3{19.3, 21.7, 18.1}, .center = Vec3{0, 40, 3}, .fov = 80.0};
-}
-
-double largestDifference(const Image& a, const Image& b) {
-  double largest = a.rgba.size() == b.rgba.size() ? 0.0 : 1.0;
-  for (std::size_t i = 0; i < std::min(a.rgba.size(), b.rgba.size()); ++i)
-    largest = std::max(largest, std::abs(double(a.rgba[i]) - double(b.rgba[i])));
-  return largest;
-}
 
 /// Rounding decides about a voxel if m is within about 1e-7 of the end of a support. This is hardly
 /// one voxel of the 64,000 in these scenes. With the default camera, the samples of a voxel, which
@@ -56,11 +45,7 @@ class FieldOnGpu : public OnGpu, public testing::WithParamInterface<Between> {
  protected:
   [[nodiscard]] RenderOptions optionsFor(const CameraWish& wish = {},
                                          Resolution resolution = {130, 77}) const {
-    RenderOptions o;
-    o.resolution = resolution;
-    o.camera = fitCamera(kFieldBox, wish, resolution);
-    o.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
-    o.opacityLength = 8.0;
+    RenderOptions o = pictureOf(kFieldBox, resolution, 8.0, wish);
     o.between = GetParam();
     // Rounding decides whether a voxel at the end of a support is exactly the background. With this
     // transfer function its samples are transparent in both cases; another test uses the linear
@@ -77,9 +62,7 @@ class FieldOnGpu : public OnGpu, public testing::WithParamInterface<Between> {
                             const RendererLimits& limits = {},
                             const RevoxeliseOptions& voxels = {}) const {
     const Image expected = renderField(field, o, voxels);
-    double light = 0.0;
-    for (const float v : expected.rgba) light += v;
-    EXPECT_GT(light, 0.0) << "an empty picture proves nothing";
+    expectAnyLight(expected);
     EXPECT_LE(largestDifference(drawn(field, o, limits, voxels), expected), kAsked);
   }
 };
@@ -93,33 +76,22 @@ TEST_P(FieldOnGpu, AgreesFromEveryKindOfCamera) {
 }
 
 TEST_P(FieldOnGpu, AgreesFromFarAway) {
-  CameraWish far{.eye = Vec3{1e6, 2e6, 3.3e6}, .center = Vec3{20, 20, 20}};
-  far.fov = 2.0 * std::atan(30.0 / 4e6) * 180.0 / 3.14159265358979;
-  expectTheCpusPicture(randomField({.count = 300}), optionsFor(far));
+  expectTheCpusPicture(randomField({.count = 300}), optionsFor(farAway()));
 }
 
 TEST_P(FieldOnGpu, AgreesForNeedlesPancakesAndEachKernel) {
   expectTheCpusPicture(randomField({.count = 100, .smallest = 0.1, .aspect = 200.0}), optionsFor());
   for (const float kappa : {-30.0f, -3.0f, 0.0f, 12.0f, 50.0f})
     expectTheCpusPicture(randomField({.count = 100, .kappa = kappa}), optionsFor());
-  Field field = randomField({.count = 15, .kappa = 5.0f});
-  field.chunks[0].ellipsoids.kappa.assign(15, 1.0f);
-  field.chunks[0].ellipsoids.kappa[3] = 20.0f;
-  expectTheCpusPicture(field, optionsFor());
+  expectTheCpusPicture(ownKappas(), optionsFor());
 }
 
 TEST_P(FieldOnGpu, AgreesForOneEllipsoidThatCoversEverything) {
-  Field field = randomField({.count = 1, .smallest = 300.0});
-  field.chunks[0].ellipsoids.intensity[0] = 0.3f;
-  expectTheCpusPicture(field, optionsFor());
+  expectTheCpusPicture(oneEllipsoid(300.0), optionsFor());
 }
 
 TEST_P(FieldOnGpu, AgreesWithABackgroundAndSeveralChunks) {
-  Field field = randomField({.count = 20});
-  field.background = 0.25f;
-  field.chunks.push_back(randomField({.count = 20, .extent = 20.0, .seed = 9}).chunks[0]);
-  field.chunks[1].origin = {16, -8, 8};
-  expectTheCpusPicture(field, optionsFor());
+  expectTheCpusPicture(twoChunks(), optionsFor());
 }
 
 TEST_P(FieldOnGpu, AgreesForOtherStepsSizesAndOpacities) {
@@ -207,13 +179,9 @@ TEST_P(FieldOnGpu, DrawsTheWidestPicture) {
 
 // A table of the blocks between puffs over 60,000 voxels would take gigabytes.
 TEST_P(FieldOnGpu, DrawsEllipsoidsThatLieFarApart) {
-  Field field =
-      randomField({.count = 60, .extent = 60'000.0, .smallest = 3.0, .aspect = 2.0, .seed = 11});
-  Ellipsoids& e = field.chunks[0].ellipsoids;
-  for (float& intensity : e.intensity) intensity = 0.5f + 0.5f * std::abs(intensity);
+  const Field field = puffsFarApart();
   RenderOptions o = optionsFor();
-  const Vec3 puff{e.center[0][17], e.center[1][17], e.center[2][17]};
-  o.camera.center = puff, o.camera.eye = {puff[0] + 10.0, puff[1] + 30.0, puff[2] + 60.0};
+  lookAt(field, 17, o.camera);
   const auto renderer = makeFieldRenderer(field, device_);
   EXPECT_LE(largestDifference(renderer->draw(o), makeFieldRenderer(field, Device{})->draw(o)),
             kAsked);
@@ -231,14 +199,8 @@ TEST_P(FieldOnGpu, GivesTheSameBitsInEveryRun) {
 }
 
 TEST_P(FieldOnGpu, NothingToSeeIsTransparent) {
-  const auto transparent = [](const Image& image) {
-    for (const float v : image.rgba)
-      if (v != 0.0f) return false;
-    return !image.rgba.empty();
-  };
-  EXPECT_TRUE(transparent(drawn(Field{}, optionsFor())));
-  const CameraWish away{.eye = Vec3{20, 20, 200}, .center = Vec3{20, 20, 300}};
-  EXPECT_TRUE(transparent(drawn(randomField({}), optionsFor(away))));
+  expectTransparent(drawn(Field{}, optionsFor()));
+  expectTransparent(drawn(randomField({}), optionsFor(away())));
 }
 
 TEST_P(FieldOnGpu, CountsItsWork) {
@@ -258,7 +220,7 @@ TEST_P(FieldOnGpu, CountsItsWork) {
 TEST_P(FieldOnGpu, AgreesWhereAPixelHoldsManyVoxelsAndWhereItHoldsAPart) {
   const Field field = randomField({.count = 300});
   for (const double times : {0.05, 0.5, 3.0, 20.0, 200.0}) {
-    RenderOptions o = optionsFor({.projection = Projection::kOrthographic}, {30, 21});
+    RenderOptions o = optionsFor(orthographic(), {30, 21});
     o.camera.height *= times;
     if (times < 0.1) o.opacityLength = 0.5;
     const Image expected = renderField(field, o);

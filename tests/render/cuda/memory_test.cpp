@@ -9,6 +9,7 @@
 #include "esvr/render.h"
 #include "field/random_field.h"
 #include "render/cuda/cell_store.h"
+#include "render/scenes.h"
 #include "support/on_device.h"
 
 namespace esvr::test {
@@ -34,10 +35,7 @@ using MemoryOnGpu = OnGpu;
 
 TEST_F(MemoryOnGpu, IsSaidToBeExhaustedAndIsUsedAgain) {
   const Field field = randomField({.count = 2000, .extent = 200.0});
-  RenderOptions small;
-  small.resolution = {160, 120};
-  small.camera = fitCamera({{0, 0, 0}, {199, 199, 199}}, {}, small.resolution);
-  small.transfer = rescaled({builtInColorMap("viridis"), builtInOpacity("linear")}, {-1.0f, 1.0f});
+  const RenderOptions small = pictureOf({{0, 0, 0}, {199, 199, 199}}, {160, 120}, 1.0);
   RenderOptions large = small;
   large.resolution = {4000, 3000};  // 192 MB of pixels
   const auto renderer = makeFieldRenderer(field, device_);

@@ -1,10 +1,5 @@
-// Plan: scenes become the options that esvr-render would have; missing members have its defaults. Transfer functions go to
-// JSON and back unchanged. What is wrong is refused by the name of its member.
-//
-// Tokens have the length and the digits of 128 bits and do not repeat; texts are compared with texts that differ in one
-// place. Requests of the page are judged one by one; server_test.cpp sends the same kinds of requests as bytes.
-//
-// For the command line of a picture, functions of built-in parts are found over any range; one changed point is noticed.
+// Plan: scenes become the options that esvr-render would have; what is wrong is refused by the name of its
+// member. Requests of the page are judged one by one; server_test.cpp sends the same kinds as bytes.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -214,14 +209,6 @@ TEST(RequestRules, TakeTheOriginOfTheHostOnly) {
   }
   request.insert(http::field::origin, "http://render-07:80");
   EXPECT_EQ(judge(request, kSite).status, http::status::forbidden) << "two origins";
-}
-
-TEST(RequestRules, SendRequestsToTheSocketThatWantOne) {
-  Request request = requestTo("localhost", "/0123456789abcdef/socket");
-  EXPECT_EQ(judge(request, kSite).status, http::status::upgrade_required);
-  request.set(http::field::connection, "upgrade");
-  request.set(http::field::upgrade, "websocket");
-  EXPECT_EQ(judge(request, kSite).target, Target::kSocket);
 }
 
 // Who does not know the token learns nothing but that there is a server.

@@ -1,10 +1,7 @@
-// Plan: clients speak to a server that runs on a thread of the test. As bytes, they send requests,
-// of which the page and a socket are accepted, with the token, from this machine's names only. Over
-// sockets, every kind of message has its answer; pictures become finer until the last one; each
-// client gets the pictures of its own camera. Clients that know the token then do what no page
-// does: they break the protocol, send nonsense and numbers without bounds, stop in the middle, and
-// do not read. Each of them loses its connection or gets an error, and another client is served as
-// before.
+// Plan: clients speak to a server that runs on a thread of the test, as bytes and over sockets. Clients
+// that know the token then do what no page does: they break the protocol, send nonsense and numbers
+// without bounds, stop in the middle, and do not read. Each of them loses its connection or gets an
+// error, and another client is served as before.
 
 #include "render/view/server.h"
 
@@ -19,6 +16,7 @@
 #include "field/random_field.h"
 #include "render/view/page.h"
 #include "render/view/view_client.h"
+#include "support/messages.h"
 
 namespace esvr::view {
 namespace {
@@ -189,12 +187,20 @@ TEST_F(ServerTest, SendsTheWholeAnswerToAClientThatSendsALargeBody) {
   EXPECT_EQ(statusOf(client.receive()), 405);
 }
 
-TEST(ServerLimitsTest, ClientsBeyondTheLimitAreSentAwayUntilOneLeaves) {
+/// A server of a blob with limits of its own.
+struct LimitedServer {
+  explicit LimitedServer(const ServerLimits& limits, const cli::HostMemory& memory = {})
+      : server({files / "blob.esvr"}, limits, memory) {}
+
   const test::ViewFiles files;
-  ServerLimits limits;
-  limits.clients = 2;
-  const RunningServer server({files / "blob.esvr"}, limits);
-  const auto at = server.address();
+  const RunningServer server;
+  const test::ViewAddress at = server.address();
+  const std::string pageRequest = getRequest(at, "/" + at.token + "/");
+};
+
+TEST(ServerLimitsTest, ClientsBeyondTheLimitAreSentAwayUntilOneLeaves) {
+  const LimitedServer server({.clients = 2});
+  const auto& at = server.at;
   const std::string request = getRequest(at, "/" + at.token + "/socket", kUpgrade);
   {
     test::ViewClient first(at), second(at);
@@ -212,45 +218,35 @@ TEST(ServerLimitsTest, ClientsBeyondTheLimitAreSentAwayUntilOneLeaves) {
 }
 
 TEST(ServerLimitsTest, HalfRequestsAreClosedAfterTheirTime) {
-  const test::ViewFiles files;
-  ServerLimits limits;
-  limits.guestTime = std::chrono::milliseconds(50);
-  const RunningServer server({files / "blob.esvr"}, limits);
-  const auto at = server.address();
+  const LimitedServer server({.guestTime = std::chrono::milliseconds(50)});
+  const auto& at = server.at;
   test::RawClient silent(at), half(at);
   (void)half.send("GET /" + at.token + "/ HTTP/1.1\r\nHost: 127.");
   EXPECT_EQ(silent.receive(), "");
   EXPECT_EQ(half.receive(), "");
-  EXPECT_EQ(statusOf(answerTo(at, getRequest(at, "/" + at.token + "/"))), 200);
+  EXPECT_EQ(statusOf(answerTo(at, server.pageRequest)), 200);
 }
 
 TEST(ServerLimitsTest, AGuestBeyondTheLimitTakesThePlaceOfTheFirst) {
-  const test::ViewFiles files;
-  ServerLimits limits;
-  limits.guests = 2;
-  limits.guestTime = std::chrono::hours(1);
-  const RunningServer server({files / "blob.esvr"}, limits);
-  const auto at = server.address();
-  test::RawClient first(at), second(at), third(at);
+  const LimitedServer server({.guests = 2, .guestTime = std::chrono::hours(1)});
+  test::RawClient first(server.at), second(server.at), third(server.at);
   EXPECT_EQ(first.receive(), "");
-  (void)third.send(getRequest(at, "/" + at.token + "/"));
-  EXPECT_EQ(statusOf(third.receive()), 200);
-  (void)second.send(getRequest(at, "/" + at.token + "/"));
-  EXPECT_EQ(statusOf(second.receive()), 200);
+  for (test::RawClient* client : {&third, &second}) {
+    (void)client->send(server.pageRequest);
+    EXPECT_EQ(statusOf(client->receive()), 200);
+  }
 }
 
 TEST(ServerLimitsTest, GuestsWithoutTheTokenKeepNobodyOut) {
-  const test::ViewFiles files;
-  ServerLimits limits;
-  limits.guestTime = std::chrono::hours(1);
-  const RunningServer server({files / "blob.esvr"}, limits);
-  const auto at = server.address();
+  const ServerLimits limits{.guestTime = std::chrono::hours(1)};
+  const LimitedServer server(limits);
+  const auto& at = server.at;
   std::vector<std::unique_ptr<test::RawClient>> idle;
   for (std::size_t i = 0; i < 3 * limits.guests; ++i) {
     idle.push_back(std::make_unique<test::RawClient>(at));
     if (i % 2 == 0) (void)idle.back()->send("GET /wrong/ HTTP/1.1\r\nHost: 127.");
     if (i % 16 == 0) {
-      EXPECT_EQ(statusOf(answerTo(at, getRequest(at, "/" + at.token + "/"))), 200);
+      EXPECT_EQ(statusOf(answerTo(at, server.pageRequest)), 200);
     }
   }
   test::ViewClient client(at);
@@ -258,15 +254,14 @@ TEST(ServerLimitsTest, GuestsWithoutTheTokenKeepNobodyOut) {
 }
 
 TEST(ServerLimitsTest, PicturesKeepToTheMemoryOfTheProgram) {
-  const test::ViewFiles files;
   constexpr std::uint64_t kBytes = 30 << 20;  // of one picture of 600 x 600, but not of two
-  const RunningServer server({files / "blob.esvr"}, {}, {kBytes, {}});
+  const LimitedServer server({}, {kBytes, {}});
   const auto message = [](int id, int side) {
     auto draw = test::drawMessage(id);
     draw["width"] = draw["height"] = side;
     return draw;
   };
-  test::ViewClient first(server.address()), second(server.address());
+  test::ViewClient first(server.at), second(server.at);
   first.send(message(1, 600)), second.send(message(2, 600));
   // Each gets its last picture, although only one of them has room between two passes.
   for (test::ViewClient* client : {&first, &second}) {
@@ -287,8 +282,8 @@ TEST(ServerStart, SaysWhichAddressCannotBeUsed) {
   const Service::Settings settings{
       {boost::asio::ip::address_v4::loopback(), server.address().port}, {}, {}, {}};
   EXPECT_THAT([&] { const Service second(collection, settings); },
-              testing::ThrowsMessage<RuntimeFailure>(
-                  HasSubstr("127.0.0.1, port " + std::to_string(server.address().port))));
+              test::ThrowsSaying<RuntimeFailure>("127.0.0.1, port " +
+                                                 std::to_string(server.address().port)));
 }
 
 // Messages.
