@@ -95,7 +95,7 @@ RenderOptions manyLevels() {
   return o;
 }
 
-TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
+TEST_F(CellsOnGpu, DrawTheLevelsOfFieldsAndVolumes) {
   const Field field = manyBlobs();
   const SparseVolume volume = revoxelise(field, kVoxels);
   const auto drawn = renderer(field), ofVolume = makeVolumeRenderer(volume, device_);
@@ -103,10 +103,10 @@ TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
   orthographic.camera.projection = Projection::kOrthographic;
   for (const double height : {1600.0, 3200.0, 6400.0, 12800.0, 25600.0}) {
     orthographic.camera.height = height;
-    expectClose(drawn->draw(orthographic), renderVolume(volume, orthographic), 1000);
+    expectClose(drawn->draw(orthographic), renderField(field, orthographic, kVoxels), 1000);
     expectClose(ofVolume->draw(orthographic), renderVolume(volume, orthographic), 1000);
   }
-  expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
+  expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), kVoxels), 1000);
   expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
 }
 
@@ -119,7 +119,7 @@ TEST_F(CellsOnGpu, DrawTheVoxelsOfMasksWithinABox) {
     const auto drawn = makeFieldRenderer(field, device_, {}, rule);
     const Image image = drawn->draw(options(70.0));
     expectClose(image, renderVolume(volume, options(70.0)), 1000);
-    expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
+    expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), rule), 1000);
     EXPECT_EQ(drawn->draw(options(70.0)).rgba, image.rgba);
     EXPECT_NE(image.rgba, renderer(field)->draw(options(70.0)).rgba);
   }
@@ -133,7 +133,7 @@ TEST_F(CellsOnGpu, DrawVoxelsThatAreAlwaysActive) {
   const SparseVolume volume = revoxelise(field, rule);
   const auto drawn = makeFieldRenderer(field, device_, {}, rule);
   expectClose(drawn->draw(options(70.0)), renderVolume(volume, options(70.0)), 1000);
-  expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()), 1000);
+  expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), rule), 1000);
 }
 
 TEST_F(CellsOnGpu, DrawBricksOfWhichNoMaskHasAVoxel) {
@@ -152,7 +152,7 @@ TEST_F(CellsOnGpu, AreShadedAsOnTheCpu) {
   shaded.shading = levels.shading = Shading{};
   // A gradient near a flat spot turns with the rounding of its values.
   expectClose(renderer(field)->draw(shaded), renderVolume(volume, shaded), 200);
-  expectClose(renderer(field)->draw(levels), renderVolume(volume, levels), 200);
+  expectClose(renderer(field)->draw(levels), renderField(field, levels, kVoxels), 200);
   expectClose(makeVolumeRenderer(volume, device_)->draw(shaded), renderVolume(volume, shaded), 200);
 }
 
