@@ -42,10 +42,10 @@ struct KernelMoments {
 /// background, with which a voxel at its border is mixed by this share.
 [[nodiscard]] ESVR_HD inline float shareWithin(const Box& box, int level, const Coord& voxel) {
   const auto along = [level](std::int32_t low, std::int32_t high, std::int32_t at) {
-    const std::int64_t first = std::int64_t(at) << level;
-    const std::int64_t last = first + (std::int64_t{1} << level) - 1;
+    const std::int64_t all = std::int64_t{1} << level, first = at * all, last = first + all - 1;
     const std::int64_t from = first < low ? low : first, to = high < last ? high : last;
-    return to < from ? 0.0f : float(to - from + 1) / float(last - first + 1);
+    const std::int64_t inside = to - from + 1;
+    return inside <= 0 ? 0.0f : (inside < all ? float(inside) / float(all) : 1.0f);
   };
   return along(box.min.x, box.max.x, voxel.x) * along(box.min.y, box.max.y, voxel.y) *
          along(box.min.z, box.max.z, voxel.z);
