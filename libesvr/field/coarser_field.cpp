@@ -14,7 +14,7 @@ namespace esvr {
 
 // Moments of kernels.
 
-KernelMoments momentsOf(const KernelConstants<double>& kernel) {
+PlaceMoments momentsOf(const KernelConstants<double>& kernel) {
   // The integrals of phi r^2, phi r^4 and phi r^6 over the support, by the midpoint rule.
   constexpr int kParts = 128;
   const double part = supportRadius(kernel) / kParts;
@@ -30,23 +30,23 @@ KernelMoments momentsOf(const KernelConstants<double>& kernel) {
 namespace {
 
 /// The kernels from which wider ones are chosen by their kurtosis, which falls as kappa rises.
-class KernelShapes {
+class WiderKernels {
  public:
-  explicit KernelShapes(const Kernel& kernel) {
+  explicit WiderKernels(const Kernel& kernel) {
     for (int n = 0; n <= kCount; ++n)
       moments_.push_back(momentsOf(kernelConstants<double>(kernel, kappaAt(n))));
   }
 
   struct Shape {
     double kappa;
-    KernelMoments moments;
+    PlaceMoments moments;
   };
   /// The kernel of this kurtosis, or the nearest one.
   [[nodiscard]] Shape withKurtosis(double kurtosis) const {
     const auto above =
-        std::ranges::lower_bound(moments_, kurtosis, std::greater<>(), &KernelMoments::kurtosis);
+        std::ranges::lower_bound(moments_, kurtosis, std::greater<>(), &PlaceMoments::kurtosis);
     const auto n = std::clamp(above - moments_.begin(), std::ptrdiff_t{1}, std::ptrdiff_t{kCount});
-    const KernelMoments &a = moments_[std::size_t(n) - 1], &b = moments_[std::size_t(n)];
+    const PlaceMoments &a = moments_[std::size_t(n) - 1], &b = moments_[std::size_t(n)];
     const double apart = a.kurtosis - b.kurtosis;
     const double t = apart > 0.0 ? std::clamp((a.kurtosis - kurtosis) / apart, 0.0, 1.0) : 0.0;
     const auto between = [t](double from, double to) { return from + t * (to - from); };
@@ -60,7 +60,7 @@ class KernelShapes {
   static constexpr int kCount = 192;
   static double kappaAt(int n) { return kSoftest + (kSharpest - kSoftest) * n / kCount; }
 
-  std::vector<KernelMoments> moments_;  ///< kCount + 1
+  std::vector<PlaceMoments> moments_;  ///< kCount + 1
 };
 
 // The filter.
@@ -121,9 +121,9 @@ class CoarserEllipsoids {
   }
   /// Adds the variance of the filter along each axis, and keeps the integral.
   void widen(const Ellipsoids& from, std::size_t i, Ellipsoids& to) const {
-    const KernelMoments own =
-        from.kappa.empty() ? shared_
-                           : momentsOf(kernelConstants<double>(field_.kernel, from.kappa[i]));
+    const PlaceMoments own = from.kappa.empty()
+                                 ? shared_
+                                 : momentsOf(kernelConstants<double>(field_.kernel, from.kappa[i]));
     std::array<double, 3> scales, shares;
     for (std::size_t a = 0; a < 3; ++a) {
       scales[a] = std::exp(double(from.logScale[a][i]));
@@ -142,8 +142,8 @@ class CoarserEllipsoids {
   }
 
   const Field& field_;
-  KernelShapes shapes_;
-  KernelMoments shared_;
+  WiderKernels shapes_;
+  PlaceMoments shared_;
   double side_, filter_;
 };
 

@@ -13,12 +13,12 @@ namespace esvr {
 
 /// The moments of a kernel whose scales are 1, as a distribution of places. They are computed by
 /// quadrature, with an error below 2 % for the sharpest edges, and below 1e-4 for kappa up to 10.
-struct KernelMoments {
+struct PlaceMoments {
   double mass;  ///< integral of phi r^2 over the distance r; that over space is 4 pi times as much
   double variance;  ///< along each axis
   double kurtosis;  ///< mean of r^4 in units of variance^2: 15 for a Gaussian, less with edges
 };
-[[nodiscard]] KernelMoments momentsOf(const KernelConstants<double>& kernel);
+[[nodiscard]] PlaceMoments momentsOf(const KernelConstants<double>& kernel);
 
 /// The field in the index space of a level: its voxel v has the place of the middle of the 2^level
 /// voxels from 2^level v on, along each axis. Sums of level 0 are the field itself.

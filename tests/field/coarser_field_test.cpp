@@ -115,7 +115,7 @@ TEST(CoarserField, KnowsTheMomentsOfKernels) {
       const double phi = kernelPhi(k, rr) * rr * supportRadius(k) / kParts;
       mass += phi, second += phi * rr, fourth += phi * rr * rr;
     }
-    const KernelMoments moments = momentsOf(k);
+    const PlaceMoments moments = momentsOf(k);
     const double tolerance = kappa > 10.0 ? 0.02 : 1e-4;
     EXPECT_NEAR(moments.mass, mass, tolerance * mass) << kappa;
     EXPECT_NEAR(moments.variance, second / (3.0 * mass), tolerance * moments.variance) << kappa;
