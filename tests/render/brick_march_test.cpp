@@ -430,8 +430,9 @@ TEST(LevelOfDetail, CellsAndVolumesAgree) {
     if (mode != RenderMode::kComposite) o.opacityLength = 5.0;
     const Image cells = renderField(field, o, ofMeans);
     EXPECT_GE(imagePsnr(renderVolume(volume, o), cells), 80.0) << int(mode);
-    if (mode != RenderMode::kDepth)  // whose values are no colors
+    if (mode != RenderMode::kDepth) {  // whose values are no colors
       EXPECT_GE(imagePsnr(cells, renderField(field, o)), 30.0) << "sums, roughly: " << int(mode);
+    }
     o.lod = LevelOfDetail::kOff;
     EXPECT_LT(imagePsnr(renderVolume(volume, o), cells), 60.0) << "levels must be at work";
   }
