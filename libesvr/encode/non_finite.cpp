@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <variant>
@@ -33,7 +34,9 @@ struct VoxelPlace {
 };
 
 /// Fills voxels in rounds: those beside a voxel with a value first, and then those beside them. Each round reads values
-/// of earlier rounds only, so that the order within it does not matter.
+/// of earlier rounds only, so that the order within it does not matter. Means have creases where rounds from different
+/// sides meet, which a fit would pay for. They are therefore relaxed until each voxel is about the mean of all its neighbours,
+/// which is the smoothest continuation of the values around.
 class Filler {
  public:
   Filler(SparseVolume& volume, Filling filling)
@@ -48,11 +51,18 @@ class Filler {
           missing_[b].set(v);
   }
 
-  /// \param rest  value of the voxels that no round reaches
-  void run(float rest) {
-    for (auto round = firstRound(); !round.empty(); round = nextRound(round)) fill(round);
+  /// \param range  of the values that are there
+  void run(const ValueRange& range) {
+    std::vector<BrickMask> filled = missing_;
+    int rounds = 0;
+    for (auto round = firstRound(); !round.empty(); round = nextRound(round), ++rounds) fill(round);
+    const float rest = std::clamp(volume_.background, range.min, range.max);
     for (std::size_t b = 0; b < volume_.brickCount(); ++b)
-      forEachActive(missing_[b], [&](int v) { volume_.brickValues(b)[std::size_t(v)] = rest; });
+      forEachActive(missing_[b], [&](int v) {
+        volume_.brickValues(b)[std::size_t(v)] = rest;
+        filled[b].reset(v);
+      });
+    if (filling_ == Filling::kMeans) relax(filled, rounds, range);
   }
 
  private:
@@ -126,6 +136,27 @@ class Filler {
     return float(sum / count);
   }
 
+  /// Successive over-relaxation. Neighbours differ in the parity of their coordinates, so that a sweep over one parity
+  /// reads values of the other one only.
+  /// \param rounds  the number in which they were filled, which is about half the width of the widest gap
+  void relax(const std::vector<BrickMask>& filled, int rounds, const ValueRange& range) {
+    // Wider gaps remain uneven at lengths that cost a fit nothing.
+    constexpr int kMostSweeps = 120;
+    // The best factor for a gap of this width; it is smooth after some three times as many sweeps as it has rounds.
+    const double factor = 2.0 / (1.0 + std::sin(std::numbers::pi / (2.0 * rounds + 1.0)));
+    for (int sweep = 0; sweep < std::min(3 * rounds + 10, kMostSweeps); ++sweep)
+      for (const int parity : {0, 1})
+        parallelFor(std::size_t{0}, filled.size(), [&](std::size_t b) {
+          forEachActive(filled[b], [&](int v) {
+            const Coord at = voxelLocal(v);
+            if (((at.x ^ at.y ^ at.z) & 1) != parity) return;
+            float& value = volume_.brickValues(b)[std::size_t(v)];
+            const double moved = value + factor * (valueAt({std::uint32_t(b), v}) - value);
+            value = float(std::clamp(moved, double(range.min), double(range.max)));
+          });
+        });
+  }
+
   SparseVolume& volume_;
   Filling filling_;
   BrickIndex index_;
@@ -135,9 +166,8 @@ class Filler {
 }  // namespace
 
 SparseVolume withFilledVoxels(const SparseVolume& volume, ValueType valueType, Filling filling) {
-  const ValueRange range = activeRange(volume);
   SparseVolume filled = volume;
-  Filler(filled, filling).run(std::clamp(volume.background, range.min, range.max));
+  Filler(filled, filling).run(activeRange(volume));
   if (valueType == ValueType::kHalf) roundToHalfs(filled);
   return filled;
 }
@@ -181,6 +211,7 @@ void takeBytes(const StoredGrid& kept, const ConvertOptions& options, SizeGoal& 
 ConvertOptions adapted(const SparseVolume& source, const StoredGrid& kept, ConvertOptions options) {
   const Box box = options.fit.box.value_or(activeBox(source));
   options.filledVoxels = countIn(*kept.nonFiniteVoxels, box);
+  options.filled = &*kept.nonFiniteVoxels;
   const double left = box.volume() - double(options.filledVoxels);
   const double gain = left > 0.0 ? 10.0 * std::log10(box.volume() / left) : 0.0;
   if (auto* psnr = std::get_if<PsnrGoal>(&options.goal)) psnr->psnr += gain;

@@ -21,7 +21,7 @@ using FiniteConversion = std::function<Conversion(const ConvertInput&, const Con
 
 /// How the values of neighbours become one.
 enum class Filling {
-  kMeans,  ///< smooth, for ellipsoids and quantised voxels
+  kMeans,  ///< smooth: each is about the mean of its neighbours; for ellipsoids and quantised voxels
   kCopies  ///< no new value, for exact voxels, whose palette would grow
 };
 

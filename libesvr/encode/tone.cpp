@@ -55,6 +55,7 @@ bool Judge::seesPictures(const ConvertInput& input, const ConvertOptions& option
 
 Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve tone)
     : values_(input.source),
+      filled_(options.filled),
       tone_(tone),
       range_(activeRange(input.source)),
       halfs_(input.descriptor.valueType == ValueType::kHalf),
@@ -78,8 +79,23 @@ void Judge::toValues(SparseVolume& volume) const {
   if (halfs_) roundToHalfs(volume);
 }
 
+/// Makes the filled voxels equal to the source's, so that their errors do not count.
+void Judge::forgiveFilled(SparseVolume& volume) const {
+  if (!filled_) return;
+  parallelFor(std::size_t{0}, filled_->bricks.size(), [&](std::size_t b) {
+    const Coord corner = filled_->origin + filled_->bricks[b] * kBrickSide;
+    const auto to = findBrick(volume, brickOf(corner - volume.origin));
+    const auto from = findBrick(values_, brickOf(corner - values_.origin));
+    if (!to || !from) return;
+    forEachActive(filled_->active[b], [&](int v) {
+      volume.brickValues(*to)[std::size_t(v)] = values_.brickValues(*from)[std::size_t(v)];
+    });
+  });
+}
+
 Judge::Judgement Judge::operator()(SparseVolume volume) const {
   toValues(volume);
+  forgiveFilled(volume);
   const auto ofValues = [&] { return psnrOverBox(values_, volume, box_); };
   if (!pictures_) return {ofValues()};
   const TransmittancePsnr seen = pictures_->measure(volume);

@@ -13,7 +13,7 @@ namespace esvr::encode {
 /// of its median column of 0.5 (esvr/metrics.h), and every other one by the PSNR over the box.
 class Judge {
  public:
-  /// \param input  the values; they must outlive the object
+  /// \param input  the values; they and ConvertOptions::filled must outlive the object
   /// \param tone   the volumes that are judged have tones
   Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve tone);
 
@@ -44,8 +44,10 @@ class Judge {
 
  private:
   void toValues(SparseVolume& volume) const;
+  void forgiveFilled(SparseVolume& volume) const;
 
   const SparseVolume& values_;
+  const VoxelLayer* filled_;  ///< ConvertOptions::filled
   ToneCurve tone_;
   ValueRange range_;
   bool halfs_;

@@ -27,6 +27,11 @@ bool hasVolume(const VoxelShape& shape) {
   const double ofBox = length(a) * length(b) * length(c);
   return std::isfinite(ofBox) && std::abs(inner(cross(a, b), c)) > kFlat * ofBox;
 }
+
+void requireFieldOfView(double degrees) {
+  if (!(degrees > 0.0 && degrees < 180.0))
+    throw UsageError("the field of view must be from 0 to 180 degrees");
+}
 }  // namespace
 
 Vec3 VoxelShape::place(const Vec3& index) const {
@@ -66,8 +71,7 @@ void checkCamera(const Camera& camera, Resolution resolution) {
   require(length(camera.up) > 0.0, "the camera's up has no length");
   require(std::isfinite(length(cross(unit(view), camera.up))), "the camera's up is too long");
   require(!parallel(unit(view), unit(camera.up)), "the camera looks along its up direction");
-  require(camera.fov > 0.0 && camera.fov < 180.0,
-          "the field of view must be from 0 to 180 degrees");
+  requireFieldOfView(camera.fov);
   require(camera.height > 0.0 && std::isfinite(camera.height),
           "the height of an orthographic picture must be positive");
   require(resolution.width > 0 && resolution.height > 0, "a picture needs a pixel at least");
@@ -237,6 +241,7 @@ Camera aroundSphere(const Box& box, const CameraWish& wish, Resolution resolutio
   camera.voxel = wish.voxel;
   camera.projection = wish.projection;
   camera.fov = wish.fov.value_or(camera.fov);
+  requireFieldOfView(camera.fov);  // the place of the eye follows from it
   camera.height = wish.height.value_or(2.0 * radius / std::min(1.0, aspect));
   camera.center = pivotOf(box, wish);
   const double half = std::tan(radians(camera.fov) / 2);

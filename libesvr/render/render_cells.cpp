@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/parallel.h"
+#include "field/coarser_field.h"
 #include "field/voxel_rule.h"
 
 namespace esvr {
@@ -16,8 +17,11 @@ namespace esvr {
 
 namespace {
 
-std::vector<Coord> voxelCorners(const Field& field, const RevoxeliseOptions& voxels) {
-  std::vector<Coord> reached = reachedBricks(field, voxels.box);
+/// The bricks of level 0 or, where coarser levels are sums, of a coarser one.
+/// \param voxels  rule of the level
+std::vector<Coord> voxelCorners(const Field& inLevel, const RevoxeliseOptions& voxels, int level) {
+  if (level > 0) return coarserReach(inLevel, voxels.box);
+  std::vector<Coord> reached = reachedBricks(inLevel, voxels.box);
   if (!voxels.restrictToBricks) return reached;
   std::vector<Coord> both;
   std::ranges::set_intersection(reached, voxels.bricks, std::back_inserter(both));
@@ -28,7 +32,48 @@ bool differs(std::span<const float> values, float background) {
   return std::ranges::any_of(values, [&](float v) { return v != background; });
 }
 
+/// LazyCells::roughBox()
+std::optional<PlaceBox> roughBoxOf(const Field& field, const Box& voxels) {
+  Box bricks;
+  for (const Support& support : supports(field)) {
+    const Box reached = common(brickRange(support), bricksOf(voxels));
+    if (!reached.empty()) bricks.expand(reached);
+  }
+  if (bricks.empty()) return std::nullopt;
+  // The cells below the first voxels belong to the bricks before them.
+  const Vec3 low = pointOf(bricks.min), high = pointOf(bricks.max);
+  return PlaceBox{scaled(difference(low, {1.0, 1.0, 1.0}), kBrickSide),
+                  scaled(sum(high, {1.0, 1.0, 1.0}), kBrickSide)};
+}
+
 }  // namespace
+
+LevelSums::LevelSums(const Field& inLevel, const RevoxeliseOptions& rule, const Box& box, int level)
+    : level_(level),
+      box_(box),
+      voxels_(rule),
+      rule_(makeVoxelRule(inLevel.background, rule)),
+      field_(inLevel),
+      corners_(voxelCorners(inLevel, rule, level)),
+      evaluator_(field_, corners_) {}
+
+bool LevelSums::decode(std::uint32_t number, std::span<float, kBrickVoxels> values) const {
+  evaluator_.evaluate(number, values);
+  (void)settle(rule_, regionIn(voxels_, corners_[number]), values);
+  if (level_ > 0) mixWithBox(corners_[number], values);
+  return differs(values, rule_.background);
+}
+
+/// Mixes voxels at the border of the box with the background outside.
+void LevelSums::mixWithBox(Coord corner, std::span<float, kBrickVoxels> values) const {
+  const Coord last = corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1};
+  if (shareWithin(box_, level_, corner) == 1.0f && shareWithin(box_, level_, last) == 1.0f) return;
+  for (int v = 0; v < kBrickVoxels; ++v) {
+    const float share = shareWithin(box_, level_, corner + voxelLocal(v));
+    float& value = values[std::size_t(v)];
+    if (share < 1.0f) value = brick_march::between(rule_.background, value, share);
+  }
+}
 
 LazyCells::Level::Level(std::span<const Coord> bricks, std::uint32_t firstCells)
     : index(bricks),
@@ -37,31 +82,44 @@ LazyCells::Level::Level(std::span<const Coord> bricks, std::uint32_t firstCells)
       cells(table.bricks.size()) {}
 
 LazyCells::LazyCells(const Field& field, const RevoxeliseOptions& voxels)
-    : field_(field),
-      voxels_(voxels),
-      rule_(makeVoxelRule(field.background, voxels)),
-      corners_(voxelCorners(field, voxels)),
-      evaluator_(field_, corners_) {
-  levels_.push_back(std::make_unique<Level>(bricksAt(corners_), 0u));
+    : field_(field), voxels_(voxels), coarserAreSums_(hasCoarserFields(voxels)) {
+  if (coarserAreSums_) roughBox_ = roughBoxOf(field, voxels.box);
 }
 
-void LazyCells::prepare(int lastLevel) {
-  while (int(levels_.size()) <= lastLevel) {
-    const Level& finer = *levels_.back();
-    levels_.push_back(
-        std::make_unique<Level>(coarserBricks(finer.index.bricks()),
-                                finer.table.first + std::uint32_t(finer.table.bricks.size())));
+void LazyCells::prepare(int first, int last) {
+  for (int level = coarserAreSums_ ? first : 0; level <= last; ++level)
+    if (!isPrepared(level)) make(level);
+}
+
+void LazyCells::make(int level) {
+  std::uint32_t firstCells = 0;
+  if (!made_.empty()) {
+    const BrickTable& before = table(made_.back());
+    firstCells = before.first + std::uint32_t(before.bricks.size());
   }
+  std::unique_ptr<const LevelSums> sums;
+  if (level == 0)
+    sums = std::make_unique<LevelSums>(field_, voxels_, voxels_.box, 0);
+  else if (coarserAreSums_)
+    sums = std::make_unique<LevelSums>(coarserField(field_, level), coarserRule(voxels_, level),
+                                       voxels_.box, level);
+  const std::vector<Coord> bricks =
+      sums ? bricksAt(sums->corners())
+           : coarserBricks(levels_[std::size_t(level) - 1]->index.bricks());
+  auto made = std::make_unique<Level>(bricks, firstCells);
+  made->sums = std::move(sums);
+  levels_[std::size_t(level)] = std::move(made);
+  made_.push_back(level);
 }
 
 const float* LazyCells::values(std::uint32_t brick) const {
-  int level = int(levels_.size()) - 1;
-  while (brick < table(level).first) --level;
-  const Level& l = *levels_[std::size_t(level)];
+  auto level = made_.rbegin();
+  while (brick < table(*level).first) ++level;
+  const Level& l = *levels_[std::size_t(*level)];
   const std::size_t number = brick - l.table.first;
   return l.cells.get(number, [&](std::span<float, kCellBrickVoxels> values) {
-    const auto find = [&](Coord at) { return voxelsOf(level, at); };
-    return fillCells(cornerBricks(l.table.place(number), find), rule_.background, values);
+    const auto find = [&](Coord at) { return voxelsOf(*level, at); };
+    return fillCells(cornerBricks(l.table.place(number), find), field_.background, values);
   });
 }
 
@@ -71,35 +129,33 @@ const float* LazyCells::voxelsOf(int level, Coord brick) const {
   const std::uint32_t number = l.index.find(brick);
   if (number == BrickIndex::kNone) return nullptr;
   return l.voxels.get(number, [&](std::span<float, kBrickVoxels> values) {
-    return level == 0 ? decode(number, values) : average(level, brick, values);
+    return l.sums ? l.sums->decode(number, values) : average(level, brick, values);
   });
-}
-
-bool LazyCells::decode(std::uint32_t number, std::span<float, kBrickVoxels> values) const {
-  evaluator_.evaluate(number, values);
-  (void)settle(rule_, regionIn(voxels_, corners_[number]), values);
-  return differs(values, rule_.background);
 }
 
 /// Averages the bricks of the next finer level. Those of level 0 are not kept, because a picture
 /// that needs their means does not read them again.
 bool LazyCells::average(int level, Coord brick, std::span<float, kBrickVoxels> values) const {
-  std::ranges::fill(values, rule_.background);
+  std::ranges::fill(values, field_.background);
   std::array<float, kBrickVoxels> decoded;
+  const Level& finest = *levels_[0];
   for (int c = 0; c < kCellCorners; ++c) {
     const Coord finer = brick * 2 + stepToCorner(c);
     if (level > 1) {
       if (const float* const voxels = voxelsOf(level - 1, finer))
         averageInto(std::span<const float, kBrickVoxels>(voxels, kBrickVoxels), c, values);
-    } else if (const auto number = levels_[0]->index.find(finer); number != BrickIndex::kNone) {
-      if (decode(number, decoded)) averageInto(decoded, c, values);
+    } else if (const auto number = finest.index.find(finer); number != BrickIndex::kNone) {
+      if (finest.sums->decode(number, decoded)) averageInto(decoded, c, values);
     }
   }
-  return differs(values, rule_.background);
+  return differs(values, field_.background);
 }
 
 void LazyCells::forget() {
-  for (const auto& level : levels_) level->voxels.forget(), level->cells.forget();
+  for (const int made : made_) {
+    levels_[std::size_t(made)]->voxels.forget();
+    levels_[std::size_t(made)]->cells.forget();
+  }
 }
 
 // Tiles.
@@ -167,17 +223,30 @@ PlaceBox cellBoxOf(const BrickTable& table) {
   return {sum(cells.low, origin), sum(cells.high, origin)};
 }
 
+/// A box that contains all cells that a picture shows. Level 0 is prepared for it unless even the nearest
+/// samples have a coarser level that does not need it.
+PlaceBox boxFor(LazyCells& cells, const RenderOptions& options) {
+  if (const auto& rough = cells.roughBox()) {
+    checkRenderOptions(options);
+    if (levelBounds(options, viewOf(options, *rough), *rough).first > 0) return *rough;
+  }
+  cells.prepare(0, 0);
+  return cellBoxOf(cells.table(0));
+}
+
 }  // namespace
 
 Image renderCells(LazyCells& cells, const RenderOptions& options) {
-  Picture picture(options, cellBoxOf(cells.table(0)));
-  if (cells.table(0).bricks.empty()) return picture.take();
+  const PlaceBox box = boxFor(cells, options);
+  Picture picture(options, box);
+  if (box.low[0] > box.high[0]) return picture.take();  // nothing to draw
   LevelScene scene{marchScene(options, picture.view,
                               sampleRule(options, picture.table.view(), cells.background())),
-                   levelBounds(options, picture.view, cellBoxOf(cells.table(0))),
+                   levelBounds(options, picture.view, box),
                    {}};
   const LevelBounds& bounds = scene.bounds;
-  cells.prepare(bounds.last);
+  cells.prepare(bounds.first, bounds.last);
+  if (cells.table(bounds.last).bricks.empty()) return picture.take();
   const LevelTables tables(picture, options, bounds);
   for (int level = bounds.first; level <= bounds.last; ++level)
     scene.levels[level - bounds.first] = {cells.table(level).view(), cellsOf(cells.table(level)),

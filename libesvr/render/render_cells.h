@@ -6,6 +6,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/brick_index.h"
@@ -66,21 +67,51 @@ class LazyArrays {
   mutable std::vector<std::atomic<const Values*>> arrays_;
 };
 
-/// The bricks of cells of a field. Any number of threads can read at the same time.
+/// The sums of one level of a field, on all bricks that may have a voxel other than the background.
+class LevelSums {
+ public:
+  /// \param inLevel  the field in voxels of the level
+  /// \param rule     by which its sums become voxels; its bricks and masks must outlive the object
+  /// \param box      no voxel of level 0 outside it is active
+  /// \throws MemoryExceeded  as for reachedBricks
+  LevelSums(const Field& inLevel, const RevoxeliseOptions& rule, const Box& box, int level);
+
+  [[nodiscard]] const std::vector<Coord>& corners() const { return corners_; }
+  /// The voxels of a brick. \return false if all are the background
+  bool decode(std::uint32_t number, std::span<float, kBrickVoxels> values) const;
+
+ private:
+  void mixWithBox(Coord corner, std::span<float, kBrickVoxels> values) const;
+
+  int level_;
+  Box box_;
+  RevoxeliseOptions voxels_;
+  VoxelRule rule_;
+  PreparedField field_;
+  std::vector<Coord> corners_;  ///< index corners of the bricks of voxels, in voxels of the level
+  BrickEvaluator evaluator_;
+};
+
+/// The bricks of cells of a field. Any number of threads can read at the same time. Coarser levels are sums
+/// of wider ellipsoids (field/coarser_field.h), for which no finer level is made; where
+/// hasCoarserFields() says no, they are means of the next finer one.
 class LazyCells {
  public:
   /// \param field   must outlive the object
   /// \param voxels  rule by which sums become voxels; its bricks and masks must outlive the object. If
   ///                its bricks are restricted, voxels elsewhere are the background
-  /// \throws MemoryExceeded  as for reachedBricks
-  /// \throws UsageError      as for makeBrickTable
   LazyCells(const Field& field, const RevoxeliseOptions& voxels);
 
-  [[nodiscard]] float background() const { return rule_.background; }
-  /// Makes levels of detail up to this one; no thread may read at the same time.
-  /// \throws UsageError  as for makeBrickTable
-  void prepare(int lastLevel);
-  /// The bricks of level 0, or of a level that was prepared.
+  [[nodiscard]] float background() const { return field_.background; }
+  /// Makes these levels of detail; no thread may read at the same time.
+  /// \throws MemoryExceeded  as for reachedBricks
+  /// \throws UsageError      as for makeBrickTable
+  void prepare(int first, int last);
+  /// A box around the cells of level 0, in index space, that is found without them; nothing if coarser
+  /// levels need level 0, or there is no ellipsoid in the box of the voxels.
+  [[nodiscard]] const std::optional<PlaceBox>& roughBox() const { return roughBox_; }
+  [[nodiscard]] bool isPrepared(int level) const { return bool(levels_[std::size_t(level)]); }
+  /// The bricks of a level that was prepared.
   [[nodiscard]] const BrickTable& table(int level) const {
     return levels_[std::size_t(level)]->table;
   }
@@ -97,18 +128,19 @@ class LazyCells {
     BrickTable table;
     LazyArrays<kBrickVoxels> voxels;
     LazyArrays<kCellBrickVoxels> cells;
+    std::unique_ptr<const LevelSums> sums;  ///< null: voxels are means of the next finer level
   };
 
+  void make(int level);
   [[nodiscard]] const float* voxelsOf(int level, Coord brick) const;
-  bool decode(std::uint32_t number, std::span<float, kBrickVoxels> values) const;
   bool average(int level, Coord brick, std::span<float, kBrickVoxels> values) const;
 
-  PreparedField field_;
+  const Field& field_;
   RevoxeliseOptions voxels_;
-  VoxelRule rule_;
-  std::vector<Coord> corners_;  ///< index corners of the bricks of voxels of level 0
-  BrickEvaluator evaluator_;
-  std::vector<std::unique_ptr<Level>> levels_;
+  bool coarserAreSums_;
+  std::optional<PlaceBox> roughBox_;
+  std::array<std::unique_ptr<Level>, kLevels> levels_;
+  std::vector<int> made_;  ///< the levels in the order of the numbers of their bricks
 };
 
 /// The bricks of LazyCells for marchBricks().
@@ -150,7 +182,7 @@ struct GridSlots {
 /// The cells of a grid. Those of a field are decoded when a ray reads them.
 class GridCells {
  public:
-  /// \throws  as for LazyCells and makeBrickAtlas
+  /// \throws  as for LazyCells::prepare and makeBrickAtlas
   explicit GridCells(const DrawnGrid& grid);
 
   [[nodiscard]] float background() const { return background_; }

@@ -81,6 +81,7 @@ CoverView coverViewOf(const GridsScene& scene, std::size_t grid, Resolution reso
 GridCells::GridCells(const DrawnGrid& grid) {
   if (const auto* const drawn = std::get_if<DrawnField>(&grid)) {
     field_ = std::make_unique<LazyCells>(*drawn->field, drawn->voxels);
+    field_->prepare(0, 0);
     background_ = field_->background();
   } else {
     const SparseVolume& volume = *std::get<const SparseVolume*>(grid);

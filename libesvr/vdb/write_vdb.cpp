@@ -150,9 +150,14 @@ class StreamedGrid : public openvdb::Grid<Tree> {
     keepLeaves(voxels_, this->tree());
   }
 
-  /// The bytes that the grid takes where it is read again, with its voxels.
+  /// The bytes that the grid takes where it is read again, with its voxels. Its leaves do not hold theirs, and not all
+  /// versions of OpenVDB have a function for leaves that will.
   [[nodiscard]] openvdb::Index64 memUsage() const override {
-    return openvdb::tools::memUsageIfLoaded(this->tree());
+    openvdb::Index64 bytes = openvdb::tools::memUsage(this->tree());
+    if constexpr (!std::is_same_v<Value, bool>)  // leaves of bits have no array of values
+      for (auto leaf = this->tree().cbeginLeaf(); leaf; ++leaf)
+        bytes += sizeof(Leaf) + Leaf::SIZE * sizeof(Value) - leaf->memUsage();
+    return bytes;
   }
 
   void writeBuffers(std::ostream& stream) const override {

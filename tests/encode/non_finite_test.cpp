@@ -10,10 +10,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <vector>
 
+#include "../field/random_field.h"
 #include "../fit/volumes.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
@@ -238,9 +240,8 @@ TEST(FilledVoxels, AreMeansOfNeighboursFromTheOutsideInward) {
                                  }()},
                                  0.0f);
   const SparseVolume means = withFilledVoxels(line, ValueType::kFloat, Filling::kMeans);
-  EXPECT_EQ(valueAt(means, {0, 0, 1}), 1.0f);
-  EXPECT_EQ(valueAt(means, {0, 0, 2}), 3.0f);  // of the 1 and the 5 beside it
-  EXPECT_EQ(valueAt(means, {0, 0, 3}), 5.0f);
+  for (int z = 1; z < 4; ++z)
+    EXPECT_NEAR(valueAt(means, {0, 0, z}), 1.0 + z, 0.01) << "a slope from the 1 to the 5";
   const SparseVolume copies = withFilledVoxels(line, ValueType::kFloat, Filling::kCopies);
   EXPECT_EQ(valueAt(copies, {0, 0, 2}), 1.0f);
 }
@@ -254,6 +255,55 @@ TEST(FilledVoxels, KeepTheRangeOfTheOthersAndTheActiveVoxels) {
     EXPECT_EQ(activeRange(filled).min, activeRange(source).min);
     EXPECT_EQ(activeRange(filled).max, activeRange(source).max);
   }
+}
+
+// A linear function is the mean of its neighbours everywhere. Twelve rounds leave a part of the first guess that is below
+// a hundredth of the range.
+TEST(FilledVoxels, ContinueALinearFunctionThroughAWideGap) {
+  const auto slope = [](Coord v) {
+    return 0.03f * float(v.x) + 0.02f * float(v.y) - 0.01f * float(v.z) + 1.0f;
+  };
+  const SparseVolume source = test::volumeOf({}, 4, 0.0f, [&](Coord v) {
+    return std::hypot(v.x - 15.0, v.y - 16.0, v.z - 14.0) < 12.0 ? kNan : slope(v);
+  });
+  const SparseVolume filled = withFilledVoxels(source, ValueType::kFloat, Filling::kMeans);
+  double largest = 0.0;
+  for (int n = 0; n < 32 * 32 * 32; ++n) {
+    const Coord v{n / 1024, n / 32 % 32, n % 32};
+    largest = std::max(largest, std::abs(double(valueAt(filled, v)) - slope(v)));
+  }
+  EXPECT_LT(largest, 0.015);
+}
+
+/// Turbulent smoke of 32^3 voxels: waves of 5 to 25 voxels in all directions. \param gap  where it has NaN
+SparseVolume smokeWith(const std::function<bool(Coord)>& gap) {
+  test::Random random(5);
+  std::vector<std::array<double, 4>> waves(40);  // along x, y and z, and the phase
+  for (auto& wave : waves)
+    wave = {random(-0.7, 0.7), random(-0.7, 0.7), random(-0.7, 0.7), random(0.0, 6.3)};
+  return test::volumeOf({}, 4, 0.0f, [&](Coord v) {
+    if (gap(v)) return kNan;
+    double sum = 0.0;
+    for (const auto& w : waves) sum += std::sin(w[0] * v.x + w[1] * v.y + w[2] * v.z + w[3]);
+    return float(std::max(0.05, 2.0 + 0.25 * sum));
+  });
+}
+
+// Means without the relaxation have creases in the ball, which take 4 % more bytes than the smoke.
+TEST(FilledVoxels, TakeNoMoreBytesThanTheVoxelsThatTheyReplace) {
+  ConvertOptions options;
+  options.goal = PsnrGoal{27.0};
+  options.representation = Representation::kEllipsoids;
+  const auto bytes = [&](const std::function<bool(Coord)>& gap) {
+    const SparseVolume smoke = smokeWith(gap);
+    return bytesAdded(
+        convertVolume({{}, withFilledVoxels(smoke, ValueType::kFloat, Filling::kMeans)}, options)
+            .grid);
+  };
+  const std::uint64_t whole = bytes([](Coord) { return false; });
+  EXPECT_LE(bytes([](Coord v) { return std::hypot(v.x - 15.0, v.y - 16.0, v.z - 17.0) < 11.0; }),
+            whole);
+  EXPECT_LE(bytes([](Coord v) { return (v.x * 7 + v.y * 3 + v.z * 11) % 5 == 0; }), whole);
 }
 
 TEST(FilledVoxels, WithoutANeighbourHaveTheBackgroundOrTheNearestValue) {

@@ -4,6 +4,7 @@
 // are compared with values computed by hand.
 #include "esvr/camera.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -258,6 +259,14 @@ TEST(Camera, WhatMakesNoSenseIsRefused) {
   refused([](Camera&) {}, {32768, 10});
   refused([](Camera&) {}, {10, 100'000});
   EXPECT_NO_THROW(checkCamera(good, {Resolution::kMaxSide, 1}));
+}
+
+// Its place would not be finite, and be named instead of the field of view.
+TEST(Camera, IsNotFittedToAFieldOfViewThatMakesNoSense) {
+  for (const double fov : {0.0, -5.0, 180.0, std::nan("")}) {
+    const auto fitted = [&] { (void)fitCamera(kBox, {.fov = fov}, {}); };
+    EXPECT_THAT(fitted, testing::ThrowsMessage<UsageError>(testing::HasSubstr("field of view")));
+  }
 }
 
 }  // namespace

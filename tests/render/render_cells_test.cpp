@@ -3,7 +3,9 @@
 // about 1e-6 of the sum of the intensities that reach them. Samples differ by the rounding of
 // positions to float32, 1e-5 voxel, which counts a few times as much at the sharp edges of a kappa
 // of 12 and above. The tests require 80 dB; a missed voxel or a sample of another cell costs more.
-// If a rule has a threshold, a voxel at the threshold may be active in one picture only: 70 dB.
+// If a rule has a threshold, a voxel at the threshold may be active in one picture only: 70 dB. Coarser
+// levels are sums of wider ellipsoids and not means of voxels. Both are compared with pictures of 4 x 4
+// rays a pixel of level 0, whose differences from them are mostly those of any picture with one ray.
 #include <gtest/gtest.h>
 
 #include <string>
@@ -13,13 +15,14 @@
 #include "esvr/vdb_io.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
+#include "render/render_cells.h"
 #include "render/scenes.h"
 #include "support/on_threads.h"
 
 namespace esvr::test {
 namespace {
 
-constexpr double kAskedOfCells = 80.0, kAskedByThreshold = 70.0;
+constexpr double kAskedOfCells = 80.0, kAskedByThreshold = 70.0, kAskedOfCoarser = 38.0;
 
 RenderOptions cellOptions(const CameraWish& wish = {}, Resolution resolution = {50, 37}) {
   return pictureOf(kFieldBox, resolution, 8.0, wish);
@@ -46,9 +49,11 @@ TEST(RenderCells, DrawsTheVoxelsPictureFromEveryDirection) {
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureFromInside) {
-  for (const double fov : {80.0, 170.0})
-    EXPECT_GE(voxelAgreement(randomField({.count = 200}), cellOptions(inside(fov))), kAskedOfCells)
-        << fov;
+  for (const double fov : {80.0, 170.0}) {
+    RenderOptions o = cellOptions(inside(fov));
+    o.lod = LevelOfDetail::kOff;
+    EXPECT_GE(voxelAgreement(randomField({.count = 200}), o), kAskedOfCells) << fov;
+  }
 }
 
 TEST(RenderCells, DrawsTheVoxelsPictureFromFarAway) {
@@ -74,6 +79,7 @@ TEST(RenderCells, DrawsTheVoxelsPictureAtEveryZoom) {
   for (const double times : {0.02, 0.3, 2.0, 10.0, 100.0}) {
     RenderOptions o = cellOptions(orthographic());
     o.camera.height *= times;
+    o.lod = LevelOfDetail::kOff;
     // Samples may lie exactly at voxels here. Rounding then decides whether a sample beside a voxel
     // of the background is empty, which must not matter.
     o.transfer.opacity = {{-1.0, 1.0}, {0.0, 0.0}, {1.0, 1.0}};
@@ -128,7 +134,9 @@ TEST(RenderCells, DrawsTheVoxelsOfMasksWithinABox) {
   const RenderOptions far = pictureOf({{-20, -20, -20}, {60, 60, 60}}, {20, 15}, 8.0);
   for (const RevoxeliseOptions& rule : {RevoxeliseOptions{.box = box}, masked.within(box)}) {
     EXPECT_GE(voxelAgreement(field, cellOptions(), rule), kAskedOfCells);
-    EXPECT_GE(voxelAgreement(field, far, rule), kAskedOfCells) << "means of coarser levels";
+    EXPECT_GE(voxelAgreement(field, far, rule),
+              rule.restrictToBricks ? kAskedOfCells : kAskedOfCoarser)
+        << "coarser levels";
     EXPECT_LT(imagePsnr(renderField(field, cellOptions(), rule), renderField(field, cellOptions())),
               40.0);
   }
@@ -169,6 +177,80 @@ TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = cellOptions({}, {130, 70});
   const auto draw = [&] { return renderField(field, o).rgba; };
+  const auto one = onThreads(1, draw);
+  EXPECT_EQ(one, onThreads(2, draw));
+  EXPECT_EQ(one, onThreads(5, draw));
+}
+
+// Levels of detail.
+
+/// A cloud of 120 voxels in pixels of 3.5 voxels of a level.
+struct FarCloud {
+  Field field = randomField({.count = 400, .extent = 120.0, .smallest = 1.5, .kappa = 0.3f});
+  RenderOptions options;
+
+  explicit FarCloud(int level) {
+    for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+    field.chunks[0].origin = {-64, 16, 8};
+    constexpr Box kCloud{{-64, 16, 8}, {55, 135, 127}};
+    options = cellOptions(orthographic(), {24, 24});
+    options.camera = fitCamera(kCloud, orthographic(), options.resolution);
+    options.camera.height = 24 * 3.5 * double(1 << level);
+    options.opacityLength = 200.0;
+  }
+  [[nodiscard]] Image manyRays(const RevoxeliseOptions& rule) const {
+    RenderOptions many = options;
+    many.lod = LevelOfDetail::kOff;
+    many.resolution = {4 * options.resolution.width, 4 * options.resolution.height};
+    return meansOfSquares(renderField(field, many, rule), 4);
+  }
+};
+
+TEST(RenderCells, CoarserLevelsAreAsGoodAsMeansOfVoxels) {
+  const RevoxeliseOptions plain, ofRule{.tone = {0.3f},
+                                        .threshold = 0.05f,
+                                        .range = ValueRange{0.0f, 1.5f},
+                                        .box = {{-50, 20, 9}, {50, 130, 120}}};
+  for (const RevoxeliseOptions& rule : {plain, ofRule})
+    for (const int level : {1, 2, 3}) {
+      const FarCloud cloud(level);
+      const Image expected = cloud.manyRays(rule);
+      const Image sums = renderField(cloud.field, cloud.options, rule);
+      const Image means = renderVolume(revoxelise(cloud.field, rule), cloud.options);
+      EXPECT_GE(imagePsnr(expected, sums), imagePsnr(expected, means) - 0.5) << level;
+      if (!rule.tone.isOn()) {
+        EXPECT_GE(imagePsnr(means, sums), kAskedOfCoarser) << level;
+      }
+      EXPECT_NE(means.rgba, sums.rgba) << "levels must be at work";
+    }
+}
+
+TEST(RenderCells, CoarserLevelsNeedNothingOfLevelZero) {
+  const FarCloud cloud(2);
+  LazyCells cells(cloud.field, {});
+  const Image far = renderCells(cells, cloud.options);
+  EXPECT_TRUE(cells.isPrepared(2));
+  EXPECT_FALSE(cells.isPrepared(0) || cells.isPrepared(1));
+  RenderOptions near = cloud.options;
+  near.lod = LevelOfDetail::kOff;
+  const Image fine = renderCells(cells, near);
+  EXPECT_TRUE(cells.isPrepared(0));
+  EXPECT_EQ(renderCells(cells, cloud.options).rgba, far.rgba) << "whatever was decoded before";
+  EXPECT_EQ(renderField(cloud.field, near).rgba, fine.rgba);
+}
+
+TEST(RenderCells, CoarserLevelsOfMasksAreMeans) {
+  const FarCloud cloud(2);
+  const auto bricks = reachedBricks(cloud.field);
+  const RevoxeliseOptions rule{.bricks = bricks, .restrictToBricks = true};
+  EXPECT_GE(imagePsnr(renderVolume(revoxelise(cloud.field, rule), cloud.options),
+                      renderField(cloud.field, cloud.options, rule)),
+            kAskedOfCells);
+}
+
+TEST(RenderCells, CoarserLevelsAreTheSameForAnyNumberOfThreads) {
+  const FarCloud cloud(1);
+  const auto draw = [&] { return renderField(cloud.field, cloud.options).rgba; };
   const auto one = onThreads(1, draw);
   EXPECT_EQ(one, onThreads(2, draw));
   EXPECT_EQ(one, onThreads(5, draw));

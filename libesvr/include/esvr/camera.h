@@ -93,6 +93,7 @@ inline constexpr double kFilledShare = 0.9;
 /// from the middle of the picture then takes half of kFilledShare. If the eye of a perspective
 /// camera or the height of an orthographic picture is given, nothing is fitted.
 /// \param box  of voxels, in index space; not empty
+/// \throws UsageError  the field of view is out of range
 [[nodiscard]] Camera fitCamera(const Box& box, const CameraWish& wish, Resolution resolution);
 
 /// The point about which the pictures of Framing::kTurn turn: the center that was given, or the

@@ -163,6 +163,7 @@ struct ConvertOptions {
   /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
   /// convertVolume() where the source has values that are not finite.
   std::uint64_t filledVoxels = 0;
+  const VoxelLayer* filled = nullptr;  ///< their places; set with them, and null if there are none
   /// Voxels keep a part of the errors of the previous frame, if there is one. Errors that stay in
   /// their places flicker less, for a few bytes more. It is false where `previous` is another grid.
   bool keepsPastErrors = true;

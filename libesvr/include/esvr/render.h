@@ -65,10 +65,13 @@ enum class Between {
 /// The rule for places where a pixel is wider than several voxels. Sums of ellipsoids (Between::kSum)
 /// and NanoVDB grids have no levels of detail.
 enum class LevelOfDetail {
-  /// At distances at which a pixel is at least 3 x 2^l of a voxel's longest edges wide, means of
-  /// 2^l x 2^l x 2^l voxels are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
-  /// take less time, and need less memory. A clip box has at least two voxels and two steps of a
-  /// level along each axis, or the level is not used.
+  /// At distances at which a pixel is at least 3 x 2^l of a voxel's longest edges wide, voxels of
+  /// 2^l x 2^l x 2^l are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
+  /// take less time, and need less memory. Those of a volume, and of a field with masks, bricks or a narrow
+  /// band, are means of the voxels. Those of another field are sums of its ellipsoids, which are widened
+  /// as the mean would do (docs/math.md), so that a picture that shows coarser levels only decodes no
+  /// voxel. A clip box has at least two voxels and two steps of a level along each axis, or the level is
+  /// not used.
   kAuto,
   kOff  ///< voxels are drawn wherever they are
 };
@@ -123,7 +126,8 @@ struct RenderOptions {
 /// each ray that lie in its support, between the ray's entry and its exit (paper, section
 /// "Per-ellipsoid ray sampling", algorithm 2). With Between::kVoxels, the bricks of voxels that
 /// rays read are decoded, and no others. The result is the picture of
-/// renderVolume(revoxelise(field, voxels)) up to rounding.
+/// renderVolume(revoxelise(field, voxels)) up to rounding, where coarser levels of detail (LevelOfDetail)
+/// do not make it another one.
 /// \param voxels  rule by which sums become voxels. In a narrow band, the voxels inside the surface
 ///                are -background wherever an ellipsoid reaches. Between::kSum uses its range only
 /// \throws UsageError  as for checkCamera and checkTransferFunction; step, opacityLength or

@@ -223,14 +223,14 @@ void BrickCache::decode(std::uint32_t bricks, std::uint32_t free, const LevelBou
   if (bricks == 0) return;
   std::uint8_t* const occupied = occupied_.reserve(bricks);
   check(cudaMemsetAsync(occupied, 0, bricks, stream_), "clearing marks");
-  const DecodeArguments arguments{.field = cells_.view(),
-                                  .bricks = asked_.data(),
-                                  .count = bricks,
-                                  .lastSlot = free_.data() + free - 1,
-                                  .pages = pageTable_.data(),
-                                  .occupied = occupied};
   for (int level = levels.first; level <= levels.last; ++level)
-    launchDecode(arguments, level, stream_);
+    launchDecode({.field = cells_.view(level),
+                  .bricks = asked_.data(),
+                  .count = bricks,
+                  .lastSlot = free_.data() + free - 1,
+                  .pages = pageTable_.data(),
+                  .occupied = occupied},
+                 level, stream_);
   runForEach(bricks, stream_, "giving bricks their slots", settle, account(),
              DecodedBricks{asked_.data(), bricks, free, occupied});
   takeBack<<<1, kBlock, 0, stream_>>>(account(), free - bricks);

@@ -15,6 +15,7 @@
 #include "core/cuda/runtime.h"
 #include "core/geometry.h"
 #include "field/brick_pairs.h"
+#include "field/coarser_field.h"
 #include "field/evaluate.h"
 #include "render/cuda/cuda_renderers.h"
 
@@ -59,26 +60,18 @@ void numberBricks(CellField& cells, std::vector<Coord> reached, const Revoxelise
 
 }  // namespace
 
-CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels) {
+namespace {
+
+/// Adds the ellipsoids that reach the bricks of the table, and the rule of their voxels.
+void addEllipsoids(const Field& field, const RevoxeliseOptions& voxels, CellField& cells) {
   GatheredField gathered = gather(field);
   std::vector<Support> reach = supports(field);
-  CellField cells;
   cells.forms.reserve(reach.size());
   for (std::size_t i = 0; i < reach.size(); ++i)
     cells.forms.push_back({gathered.forms[i], float(reach[i].half[2]), gathered.chunkOf[i]});
   std::ranges::transform(reach, reach.begin(), reachOfCells);
-  requireListable(reach, bricksOf(Box::whole()));
-  const SupportOf supportOf = [&](std::size_t i) { return reach[i]; };
-  // The bricks of cells of which a corner may lie in the box.
-  Box within = voxels.box;
-  if (!within.empty()) {
-    const Box bricks = bricksOf(voxels.box);
-    within = {bricks.min - Coord{1, 1, 1}, bricks.max};
-  }
-  numberBricks(cells,
-               missingBricks(BrickIndex(std::span<const Coord>{}), reach.size(), supportOf, within),
-               voxels);
-  BrickPairs pairs = pairsWithin(BrickIndex(placesOf(cells.table)), reach.size(), supportOf);
+  BrickPairs pairs = pairsWithin(BrickIndex(placesOf(cells.table)), reach.size(),
+                                 [&](std::size_t i) { return reach[i]; });
   cells.begin = std::move(pairs.brickBegin);
   cells.ellipsoid = std::move(pairs.ellipsoid);
   cells.kernels = std::move(gathered.kernels);
@@ -86,14 +79,51 @@ CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels) {
   cells.box = voxels.box;
   cells.alwaysActive.assign(voxels.alwaysActive.begin(), voxels.alwaysActive.end());
   cells.rule = makeVoxelRule(field.background, voxels);
+}
+
+}  // namespace
+
+CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels) {
+  CellField cells;
+  std::vector<Support> reach = supports(field);
+  std::ranges::transform(reach, reach.begin(), reachOfCells);
+  requireListable(reach, bricksOf(Box::whole()));
+  // The bricks of cells of which a corner may lie in the box.
+  Box within = voxels.box;
+  if (!within.empty()) {
+    const Box bricks = bricksOf(voxels.box);
+    within = {bricks.min - Coord{1, 1, 1}, bricks.max};
+  }
+  numberBricks(cells,
+               missingBricks(
+                   BrickIndex(std::span<const Coord>{}), reach.size(),
+                   [&](std::size_t i) { return reach[i]; }, within),
+               voxels);
+  addEllipsoids(field, voxels, cells);
+  cells.boxOfGrid = voxels.box;
+  return cells;
+}
+
+CellField makeCoarserCellField(const Field& field, const RevoxeliseOptions& voxels, int level,
+                               std::uint32_t firstBrick) {
+  const Field coarser = coarserField(field, level);
+  const RevoxeliseOptions rule = coarserRule(voxels, level);
+  CellField cells;
+  cells.table =
+      makeBrickTable(bricksWithCells(bricksAt(coarserReach(coarser, rule.box))), firstBrick);
+  addEllipsoids(coarser, rule, cells);
+  cells.level = level;
+  cells.boxOfGrid = voxels.box;
   return cells;
 }
 
 static_assert(CellFieldView::kNoMask == BrickIndex::kNone, "masks are numbered by brick");
 
-DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
+DeviceSums::DeviceSums(const CellField& field, cudaStream_t stream)
     : rule_(field.rule),
+      level_(field.level),
       box_(field.box),
+      boxOfGrid_(field.boxOfGrid),
       forms_(field.forms, stream),
       kernels_(field.kernels, stream),
       origins_(field.origins, stream),
@@ -102,36 +132,53 @@ DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream)
       corners_(field.corners, stream),
       masks_(field.masks, stream),
       maskOf_(field.maskOf, stream),
-      alwaysActive_(field.alwaysActive, stream) {
-  add(DeviceLevel(field.table, stream));
+      alwaysActive_(field.alwaysActive, stream) {}
+
+void DeviceSums::describe(CellFieldView& view) const {
+  view.level = level_;
+  view.forms = forms_.data();
+  view.kernels = kernels_.data();
+  view.kernelStride = kernels_.size() > 1 ? 1u : 0u;
+  view.origins = origins_.data();
+  view.begin = begin_.data();
+  view.ellipsoid = ellipsoid_.data();
+  view.corners = corners_.data();
+  view.masks = masks_.data();
+  view.maskOf = maskOf_.data();
+  view.box = box_;
+  view.alwaysActive = alwaysActive_.data();
+  view.alwaysActiveCount = std::uint32_t(alwaysActive_.size());
+  view.rule = rule_;
+  view.boxOfGrid = boxOfGrid_;
 }
 
-CellFieldView DeviceCells::view() const {
-  CellFieldView view{.table = level(0).table(),
-                     .levels = {},
-                     .forms = forms_.data(),
-                     .kernels = kernels_.data(),
-                     .kernelStride = kernels_.size() > 1 ? 1u : 0u,
-                     .origins = origins_.data(),
-                     .begin = begin_.data(),
-                     .ellipsoid = ellipsoid_.data(),
-                     .corners = corners_.data(),
-                     .masks = masks_.data(),
-                     .maskOf = maskOf_.data(),
-                     .box = box_,
-                     .alwaysActive = alwaysActive_.data(),
-                     .alwaysActiveCount = std::uint32_t(alwaysActive_.size()),
-                     .rule = rule_};
-  for (int l = 0; l < levelCount(); ++l)
-    view.levels[l] = {level(l).table().origin, level(l).first(), level(l).count(),
-                      level(l).bricks()};
+std::size_t DeviceSums::bytes() const {
+  return forms_.bytes() + kernels_.bytes() + origins_.bytes() + begin_.bytes() +
+         ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() + maskOf_.bytes() +
+         alwaysActive_.bytes();
+}
+
+DeviceCells::DeviceCells(const CellField& field, cudaStream_t stream) { add(field, stream); }
+
+void DeviceCells::add(const CellField& coarser, cudaStream_t stream) {
+  levels_.emplace_back(coarser.table, stream);
+  sums_.emplace_back(coarser, stream);
+}
+
+CellFieldView DeviceCells::view(int level) const {
+  CellFieldView view{};
+  view.table = levels_.front().table();
+  for (int l = 0; l < levelCount(); ++l) {
+    const DeviceLevel& of = levels_[std::size_t(l)];
+    view.levels[l] = {of.table().origin, of.first(), of.count(), of.bricks()};
+  }
+  sums_[std::size_t(level) < sums_.size() ? std::size_t(level) : 0].describe(view);
   return view;
 }
 
 std::size_t DeviceCells::bytes() const {
-  std::size_t bytes = forms_.bytes() + kernels_.bytes() + origins_.bytes() + begin_.bytes() +
-                      ellipsoid_.bytes() + corners_.bytes() + masks_.bytes() + maskOf_.bytes() +
-                      alwaysActive_.bytes();
+  std::size_t bytes = 0;
+  for (const DeviceSums& sums : sums_) bytes += sums.bytes();
   for (const DeviceLevel& level : levels_) bytes += level.bytes();
   return bytes;
 }
@@ -142,22 +189,17 @@ namespace {
 
 class FieldStore final : public CellStore {
  public:
-  FieldStore(const CellField& field, cudaStream_t stream)
-      : places_(placesOf(field.table)),
-        stream_(stream),
-        cells_(field, stream),
-        cache_(cells_, stream) {}
+  FieldStore(const Field& field, const RevoxeliseOptions& voxels, cudaStream_t stream)
+      : FieldStore(field, voxels, makeCellField(field, voxels), stream) {}
 
   float background() const override { return cells_.background(); }
   /// Makes all levels at once, because the bricks of all are numbered together.
   void prepare(const LevelBounds& bounds) override {
     if (bounds.last == 0 || cells_.levelCount() == kLevels) return;
-    std::vector<Coord> bricks = std::move(places_);
-    while (cells_.levelCount() < kLevels) {
-      bricks = coarserBricks(bricks);
-      cells_.add(
-          DeviceLevel(makeBrickTable(bricksWithCells(bricks), cells_.brickCount()), stream_));
-    }
+    if (hasCoarserFields(voxels_))
+      addSums();
+    else
+      addMeans();
     cache_.number();
   }
   const DeviceLevel& level(int level) const override { return cells_.level(level); }
@@ -166,7 +208,32 @@ class FieldStore final : public CellStore {
   std::size_t bytes() const override { return cells_.bytes() + cache_.bytes(); }
 
  private:
-  std::vector<Coord> places_;  ///< bricks of level 0, until the coarser levels are made
+  FieldStore(const Field& field, const RevoxeliseOptions& voxels, const CellField& cells,
+             cudaStream_t stream)
+      : field_(field),
+        voxels_(voxels),
+        places_(placesOf(cells.table)),
+        stream_(stream),
+        cells_(cells, stream),
+        cache_(cells_, stream) {}
+
+  void addSums() {
+    while (cells_.levelCount() < kLevels)
+      cells_.add(makeCoarserCellField(field_, voxels_, cells_.levelCount(), cells_.brickCount()),
+                 stream_);
+  }
+  void addMeans() {
+    std::vector<Coord> bricks = std::move(places_);
+    while (cells_.levelCount() < kLevels) {
+      bricks = coarserBricks(bricks);
+      cells_.add(
+          DeviceLevel(makeBrickTable(bricksWithCells(bricks), cells_.brickCount()), stream_));
+    }
+  }
+
+  const Field& field_;
+  const RevoxeliseOptions voxels_;
+  std::vector<Coord> places_;  ///< bricks of level 0, until coarser levels are made
   cudaStream_t stream_;
   DeviceCells cells_;
   BrickCache cache_;
@@ -225,7 +292,7 @@ class VolumeStore final : public CellStore {
 
 std::unique_ptr<CellStore> storeOf(const Field& field, const RevoxeliseOptions& voxels,
                                    cudaStream_t stream) {
-  return std::make_unique<FieldStore>(makeCellField(field, voxels), stream);
+  return std::make_unique<FieldStore>(field, voxels, stream);
 }
 
 std::unique_ptr<CellStore> storeOf(const SparseVolume& volume, cudaStream_t stream) {
@@ -262,7 +329,7 @@ class DecodeBatches {
   const float* decode(std::span<const std::uint32_t> numbers) {
     uploadTo(numbers_.data(), numbers, stream_);
     occupied_.setZero();
-    launchDecode({.field = cells_.view(),
+    launchDecode({.field = cells_.view(0),
                   .bricks = numbers_.data(),
                   .count = std::uint32_t(numbers.size()),
                   .lastSlot = slots_.data() + kBatch - 1,

@@ -61,7 +61,7 @@ struct alignas(16) CellForm {
   std::uint32_t chunk;  ///< number of its chunk
 };
 
-/// A field as bricks of cells that can be decoded one by one.
+/// A field, or a coarser level of one, as bricks of cells that can be decoded one by one.
 struct CellField {
   BrickTable table;                             ///< bricks that supports reach
   std::vector<CellForm> forms;                  ///< by ellipsoid
@@ -79,6 +79,8 @@ struct CellField {
   Box box;                          ///< no voxel outside it is active
   std::vector<Coord> alwaysActive;  ///< voxels that are active whatever their values
   VoxelRule rule;
+  int level = 0;  ///< voxels are 2^level times as long as those of the grid
+  Box boxOfGrid;  ///< the box in voxels of level 0
 };
 
 /// \param voxels  rule by which sums become voxels. If its bricks are restricted, voxels elsewhere
@@ -87,6 +89,12 @@ struct CellField {
 /// \throws RuntimeFailure  there are 2^32 pairs of ellipsoids and bricks or more
 /// \throws UsageError      as for makeBrickTable
 [[nodiscard]] CellField makeCellField(const Field& field, const RevoxeliseOptions& voxels);
+
+/// A coarser level whose voxels are sums (field/coarser_field.h).
+/// \param voxels      as above; hasCoarserFields()
+/// \param firstBrick  number of its first brick
+[[nodiscard]] CellField makeCoarserCellField(const Field& field, const RevoxeliseOptions& voxels,
+                                             int level, std::uint32_t firstBrick);
 
 /// The bricks of a DeviceLevel, as kernels read them.
 struct LevelBricks {
@@ -100,12 +108,13 @@ struct LevelBricks {
 struct CellFieldView {
   BrickTableView table;  ///< of level 0
   LevelBricks levels[kLevels];
+  int level;  ///< that of the CellField; what follows belongs to it
   const CellForm* forms;
   const KernelConstants<float>* kernels;
   std::uint32_t kernelStride;  ///< 0: one kernel for all ellipsoids; 1: one for each
   const Coord* origins;
-  const std::uint32_t *begin, *ellipsoid;
-  const std::uint8_t* corners;  ///< null: all voxels may differ from the background
+  const std::uint32_t *begin, *ellipsoid;  ///< by brick from the level's first one
+  const std::uint8_t* corners;             ///< null: all voxels may differ from the background
   /// Masks of active voxels; null: there are none. Their numbers by brick and corner, or kNoMask.
   static constexpr std::uint32_t kNoMask = 0xffffffffu;
   const BrickMask* masks;
@@ -114,30 +123,23 @@ struct CellFieldView {
   const Coord* alwaysActive;  ///< voxels that are active whatever their values
   std::uint32_t alwaysActiveCount;
   VoxelRule rule;
+  Box boxOfGrid;  ///< the box in voxels of level 0
 };
 
-/// A CellField in device memory, and the bricks of its levels of detail.
-class DeviceCells {
+/// The ellipsoids of a CellField in device memory.
+class DeviceSums {
  public:
-  DeviceCells(const CellField& field, cudaStream_t stream);
+  DeviceSums(const CellField& field, cudaStream_t stream);
 
-  /// Adds the next coarser level, whose first brick has the number brickCount().
-  void add(DeviceLevel level) { levels_.push_back(std::move(level)); }
-
-  [[nodiscard]] CellFieldView view() const;
-  [[nodiscard]] const DeviceLevel& level(int level) const { return levels_[std::size_t(level)]; }
-  [[nodiscard]] int levelCount() const { return int(levels_.size()); }
-  /// The number of bricks of all levels.
-  [[nodiscard]] std::uint32_t brickCount() const {
-    return levels_.back().first() + levels_.back().count();
-  }
+  /// Sets all of a view but its tables.
+  void describe(CellFieldView& view) const;
   [[nodiscard]] float background() const { return rule_.background; }
   [[nodiscard]] std::size_t bytes() const;
 
  private:
   VoxelRule rule_;
-  Box box_;
-  std::vector<DeviceLevel> levels_;
+  int level_;
+  Box box_, boxOfGrid_;
   DeviceBuffer<CellForm> forms_;
   DeviceBuffer<KernelConstants<float>> kernels_;
   DeviceBuffer<Coord> origins_;
@@ -146,6 +148,33 @@ class DeviceCells {
   DeviceBuffer<BrickMask> masks_;
   DeviceBuffer<std::uint32_t> maskOf_;
   DeviceBuffer<Coord> alwaysActive_;
+};
+
+/// The levels of detail of a field in device memory. The coarser ones either have sums of their own, or
+/// are means of level 0.
+class DeviceCells {
+ public:
+  DeviceCells(const CellField& field, cudaStream_t stream);
+
+  /// Adds the next coarser level, whose first brick has the number brickCount(), as means.
+  void add(DeviceLevel level) { levels_.push_back(std::move(level)); }
+  /// The same with its sums; all coarser levels have them, or none.
+  void add(const CellField& coarser, cudaStream_t stream);
+
+  /// \param level  the one whose bricks are decoded
+  [[nodiscard]] CellFieldView view(int level) const;
+  [[nodiscard]] const DeviceLevel& level(int level) const { return levels_[std::size_t(level)]; }
+  [[nodiscard]] int levelCount() const { return int(levels_.size()); }
+  /// The number of bricks of all levels.
+  [[nodiscard]] std::uint32_t brickCount() const {
+    return levels_.back().first() + levels_.back().count();
+  }
+  [[nodiscard]] float background() const { return sums_.front().background(); }
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  std::vector<DeviceLevel> levels_;
+  std::vector<DeviceSums> sums_;  ///< of level 0, or of all levels
 };
 
 struct DecodeArguments {
@@ -159,7 +188,8 @@ struct DecodeArguments {
 
 /// Decodes those of the bricks that belong to a level. Each voxel is summed in integers, as in a
 /// fit, so that a brick has the same bits whenever it is decoded and whatever is decoded with it.
-/// Bricks of coarser levels hold means of these voxels.
+/// Bricks of a coarser level without sums of its own hold means of the voxels of level 0.
+/// \param arguments  its field is DeviceCells::view() of the level
 void launchDecode(const DecodeArguments& arguments, int level, cudaStream_t stream);
 
 // The cache of decoded bricks.

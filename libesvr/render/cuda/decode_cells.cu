@@ -3,6 +3,7 @@
 #include "core/cuda/reduce.cuh"
 #include "core/cuda/runtime.h"
 #include "core/geometry.h"
+#include "field/coarser_field.h"
 #include "field/line_form.h"
 #include "field/voxel_rule.h"
 #include "render/cuda/cell_store.h"
@@ -12,16 +13,16 @@ namespace {
 
 constexpr int kDecodeThreads = 256, kWarps = kDecodeThreads / kWarp;
 
-/// The brick of level 0 that a block decodes.
+/// The brick of the field's level that a block decodes.
 struct BlockBrick {
-  std::uint32_t number;
-  Coord corner;  ///< its first voxel
+  std::uint32_t number;  ///< from the first brick of the level
+  Coord corner;          ///< its first voxel
   std::uint32_t begin, end;
 };
 __device__ BlockBrick blockBrick(const CellFieldView& field, std::uint32_t number) {
-  const LevelBricks& finest = field.levels[0];
-  return {number, finest.origin + finest.bricks[number] * kBrickSide, field.begin[number],
-          field.begin[number + 1]};
+  const LevelBricks& level = field.levels[field.level];
+  const std::uint32_t n = number - level.first;
+  return {n, level.origin + level.bricks[n] * kBrickSide, field.begin[n], field.begin[n + 1]};
 }
 
 /// The voxels of a brick that are decoded: those of its cells (side 9), or its own (side 8).
@@ -169,7 +170,10 @@ __device__ float voxelOf(const CellFieldView& field, const BlockBrick& brick, co
   const float settled = field.rule.settled(sum);
   const bool active =
       box.contains(local.x, local.y, local.z) && isActive(field, brick, local, settled);
-  return active ? settled : field.rule.inactiveValue(settled);
+  const float value = active ? settled : field.rule.inactiveValue(settled);
+  if (field.level == 0) return value;
+  const float share = shareWithin(field.boxOfGrid, field.level, brick.corner + local);
+  return share < 1.0f ? brick_march::between(field.rule.background, value, share) : value;
 }
 
 /// Decodes a brick into memory of any kind. \return whether one of this thread's voxels is not the
@@ -209,11 +213,11 @@ __device__ bool belongs(const LevelBricks& level, std::uint32_t brick) {
   return brick - level.first < level.count;  // wraps around for a smaller number
 }
 
-/// Each block decodes one brick of level 0.
+/// Each block decodes one brick of the field's level.
 __global__ void __launch_bounds__(kDecodeThreads) decodeKernel(const DecodeArguments a) {
   __shared__ Sums<kCellBrickSide> sums;
   const std::uint32_t number = a.bricks[blockIdx.x];
-  if (!belongs(a.field.levels[0], number)) return;
+  if (!belongs(a.field.levels[a.field.level], number)) return;
   const bool any = decode<kCellBrickSide>(a.field, blockBrick(a.field, number), sums,
                                           valuesOf(a, *(a.lastSlot - blockIdx.x)));
   if (__syncthreads_or(any) != 0 && threadIdx.x == 0) a.occupied[blockIdx.x] = 1;
@@ -336,7 +340,7 @@ int cubesAlong(int level) {
 void launchDecode(const DecodeArguments& a, int level, cudaStream_t stream) {
   if (a.count == 0) return;
   const int cubes = cubesAlong(level);
-  if (level == 0)
+  if (level == a.field.level)
     decodeKernel<<<a.count, kDecodeThreads, 0, stream>>>(a);
   else
     averageKernel<<<dim3(a.count, unsigned(cubes * cubes * cubes)), kDecodeThreads, 0, stream>>>(

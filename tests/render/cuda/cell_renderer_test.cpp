@@ -60,7 +60,7 @@ RenderOptions manyLevels() {
   return o;
 }
 
-TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
+TEST_F(CellsOnGpu, DrawTheLevelsOfFieldsAndVolumes) {
   const Field field = manyBlobs();
   const SparseVolume volume = revoxelise(field, kVoxels);
   const auto drawn = renderer(field), ofVolume = makeVolumeRenderer(volume, device_);
@@ -68,10 +68,10 @@ TEST_F(CellsOnGpu, DrawTheLevelsOfTheDecodedVolume) {
   flat.camera.projection = Projection::kOrthographic;
   for (const double height : {1600.0, 3200.0, 6400.0, 12800.0, 25600.0}) {
     flat.camera.height = height;
-    expectClose(drawn->draw(flat), renderVolume(volume, flat));
+    expectClose(drawn->draw(flat), renderField(field, flat, kVoxels));
     expectClose(ofVolume->draw(flat), renderVolume(volume, flat));
   }
-  expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()));
+  expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), kVoxels));
   expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()));
 }
 
@@ -84,7 +84,7 @@ TEST_F(CellsOnGpu, DrawTheVoxelsOfMasksWithinABox) {
     const auto drawn = makeFieldRenderer(field, device_, {}, rule);
     const Image image = drawn->draw(options(70.0));
     expectClose(image, renderVolume(volume, options(70.0)));
-    expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()));
+    expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), rule));
     EXPECT_EQ(drawn->draw(options(70.0)).rgba, image.rgba);
     EXPECT_NE(image.rgba, renderer(field)->draw(options(70.0)).rgba);
   }
@@ -98,7 +98,7 @@ TEST_F(CellsOnGpu, DrawVoxelsThatAreAlwaysActive) {
   const SparseVolume volume = revoxelise(field, rule);
   const auto drawn = makeFieldRenderer(field, device_, {}, rule);
   expectClose(drawn->draw(options(70.0)), renderVolume(volume, options(70.0)));
-  expectClose(drawn->draw(manyLevels()), renderVolume(volume, manyLevels()));
+  expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), rule));
 }
 
 TEST_F(CellsOnGpu, DrawBricksOfWhichNoMaskHasAVoxel) {
@@ -115,7 +115,7 @@ TEST_F(CellsOnGpu, AreShadedAsOnTheCpu) {
   shaded.shading = levels.shading = Shading{};
   // A gradient near a flat spot turns with the rounding of its values.
   expectClose(renderer(field)->draw(shaded), renderVolume(volume, shaded), 200);
-  expectClose(renderer(field)->draw(levels), renderVolume(volume, levels), 200);
+  expectClose(renderer(field)->draw(levels), renderField(field, levels, kVoxels), 200);
   expectClose(makeVolumeRenderer(volume, device_)->draw(shaded), renderVolume(volume, shaded), 200);
 }
 
