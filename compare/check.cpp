@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "compare/compare_files.h"
+#include "compare/figures.h"
 #include "compare/grid_file.h"
 #include "compare/options.h"
 #include "esvr/error.h"

@@ -104,4 +104,8 @@ std::string textOf(const Figure& figure, double value) {
   return isPsnr(figure) ? cli::decibels(value) : cli::shortNumber(value);
 }
 
+nlohmann::ordered_json finiteOrNull(double value) {
+  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
+}
+
 }  // namespace esvr::compare

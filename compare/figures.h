@@ -2,6 +2,7 @@
 /// The figures of a check: one table for options, reports, limits and baselines.
 
 #include <array>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -58,5 +59,8 @@ using FigureValues = std::array<std::optional<double>, kFigureCount>;
 
 /// A figure as a table prints it: "51.54", "exact", "0.01234".
 [[nodiscard]] std::string textOf(const Figure& figure, double value);
+
+/// A number, or null if it is not finite, since JSON has no infinity.
+[[nodiscard]] nlohmann::ordered_json finiteOrNull(double value);
 
 }  // namespace esvr::compare

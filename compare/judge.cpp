@@ -5,6 +5,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "compare/figures.h"
 #include "compare/options.h"
 #include "esvr/error.h"
 #include "programs/files.h"

@@ -1,7 +1,6 @@
 #include "compare/options.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -88,10 +87,6 @@ void checkReportFiles(const ReportFiles& files, const std::vector<std::filesyste
   check(files.markdown, ".md");
   check(files.csv, ".csv");
   check(files.html, ".html");
-}
-
-nlohmann::ordered_json finiteOrNull(double value) {
-  return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
 }
 
 std::vector<std::string> versionLines() {

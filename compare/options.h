@@ -42,9 +42,6 @@ void addReportOptions(cli::po::options_description& options);
 /// \throws UsageError, RuntimeFailure  a file cannot be written
 void checkReportFiles(const ReportFiles& files, const std::vector<std::filesystem::path>& inputs);
 
-/// A number, or null if it is not finite, since JSON has no infinity.
-[[nodiscard]] nlohmann::ordered_json finiteOrNull(double value);
-
 /// One line for the program, the format and each library.
 [[nodiscard]] std::vector<std::string> versionLines();
 /// The versions that reports of all programs have, and that of ZFP; null if there is none.

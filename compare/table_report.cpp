@@ -7,6 +7,7 @@
 #include <ostream>
 #include <span>
 
+#include "compare/figures.h"
 #include "compare/finding.h"
 #include "compare/options.h"
 #include "compare/report_parts.h"

@@ -211,11 +211,13 @@ ToneChoice chosenByFits(ToneCurve likely, const ConvertInput& given,
   constexpr double kAveragesAbove = 2.0;  // dB of what is seen: plumes 1.5 to 2.4, smoke1 3.3
   const double count = scoutCount({given, givenOptions});
   const double voxels = double(activeVoxelCount(given.source)) / (kCoarser * kCoarser * kCoarser);
-  const bool isCoarse = voxels >= kVoxelsEach * count && !givenOptions.fit.box;
-  const SparseVolume coarse = isCoarse ? coarsened(given.source, kCoarser) : SparseVolume{};
+  const bool areLarge = voxels >= kVoxelsEach * count && !givenOptions.fit.box;
+  const SparseVolume coarse = areLarge ? coarsened(given.source, kCoarser) : SparseVolume{};
+  const bool isCoarse = areLarge && Judge::seesPictures({given.descriptor, coarse}, givenOptions);
   const ConvertInput input{given.descriptor, isCoarse ? coarse : given.source};
   ConvertOptions options = givenOptions;
-  if (isCoarse) options.filledVoxels /= kCoarser * kCoarser * kCoarser;
+  // The averages have the filled voxels in other places. Their values are smooth, and may count here.
+  if (isCoarse) options.filledVoxels = 0, options.filled = nullptr;
   const Scouted with = scouted(likely, input, options, count),
                 without = scouted({}, input, options, count);
   const bool isBetter = with.forTones - without.forTones > kTuning.toneGain;

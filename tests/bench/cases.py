@@ -30,6 +30,9 @@ DENSITY_ALONE = ("gas_0004", "gas_0006", "fluid_data_0071")  # of their grids
 SEEN = {"smoke1": 100, "plume_256": 100, "gas_0006": 25, "fluid_data_0071": 25}  # parts of the bytes of the source
 SEEN_LIGHT = (0.5, 0.1)  # that the median column of voxels lets through
 SEEN_SIDE = 380          # pixels
+SEARCHED = {"preset": ["--measure", "values"], "psnr 40": ["--psnr", "40"], "psnr 50": ["--psnr", "50"],
+            "ratio 50": ["--ratio", "50", "--measure", "values"]}  # goals that are PSNR values or bytes
+BYTES_EACH, DB_PER_DOUBLING, GAIN_OF_WHOLE = 7.5, 4.5, 1.6  # of an ellipsoid; of twice as many; of a whole fit, dB
 COARSER = {"lossless": ["--lossless"], "1 %": ["--max-error", "1%"],
            "ellipsoids": ["--psnr", "40", "--representation", "ellipsoids"]}
 
@@ -186,6 +189,47 @@ def speed_summary(rows):
                 yield {"against": rival, "effort": effort, "volumes": len(pairs),
                        "times the seconds": statistics.median(a["seconds"] / max(b["seconds"], 0.01) for a, b in pairs),
                        "times their bytes": statistics.median(b["bytes"] / a["bytes"] for a, b in pairs)}
+
+
+def search(bench):
+    """The search beside the simplest one: a short fit, and a whole one of as many ellipsoids as it calls for
+    (docs/figures/search.md). Both run on two threads of a CPU and measure values.
+    """
+    def timed(name, *options):
+        file = bench.out / "search.esvr"
+        report, process = bench.report("vdb2esvr", bench.volume(name), file, *grid_of(name), *options, "--threads", 2,
+                                       "--device", "cpu", allowed=(0, 2, 4))
+        if not report["grids"] or report["error"]:
+            return None
+        grid = report["grids"][0]
+        return {"bytes": file.stat().st_size, "seconds": process.user_seconds, "psnr_box": grid["metrics"]["psnr_box"],
+                "psnr_active": grid["metrics"]["psnr_active"], "stored": grid["representation"]["stored"], "active": grid["source"]["active_voxels"]}
+
+    def simplest(name, goal, wanted, found):
+        """Two fits without a tone curve and with the signs of the values, as a user makes them who knows what ESVR costs."""
+        voxels = found["active"]
+        if goal.startswith("ratio"):
+            return timed(name, "--count", max(int(found["bytes"] / BYTES_EACH), 1))
+        first = min(voxels // 35, 6000)
+        short = timed(name, "--count", max(first, 1), "--iterations", 100)
+        reached = short["psnr_active" if goal == "preset" else "psnr_box"]
+        if reached is None:  # exact
+            return short
+        count = min(first * 2 ** ((wanted - reached - GAIN_OF_WHOLE) / DB_PER_DOUBLING), voxels / 8)
+        whole = timed(name, "--count", max(int(count), 1))
+        return {**whole, "seconds": short["seconds"] + whole["seconds"]}
+
+    def rows(name, goal):
+        found = timed(name, *SEARCHED[goal])
+        if found is None:
+            return []
+        wanted = 40.0 if goal == "preset" else float(goal.split()[1])
+        return [{"volume": name, "goal": goal, "row": row, **made} for row, made in
+                (("search", found), ("simplest", simplest(name, goal, wanted, found)))]
+
+    for name in bench.chosen(SPEED + ["neuron_m207"]):
+        for goal in SEARCHED:
+            yield (name, goal), partial(rows, name, goal)
 
 
 def seen(bench):
