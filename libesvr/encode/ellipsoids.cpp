@@ -355,7 +355,8 @@ const Attempt* EllipsoidSearch::startFor(double count) const {
   const auto distance = [&](const Attempt& a) { return std::abs(std::log(countOf(a) / count)); };
   const auto consider = [&](const Attempt& a) {
     const double growth = count / countOf(a);
-    if (a.cancelled() || growth < kLeastGrowth || growth > kMostGrowth) return;
+    // What filled the memory of a GPU would have no room to begin with.
+    if (a.cancelled() || a.fit.deviceFull || growth < kLeastGrowth || growth > kMostGrowth) return;
     if (!start || distance(a) <= distance(*start)) start = &a;
   };
   // Where many voxels saturate, a continued fit is worse (dragon: 46.8 dB instead of 48.1).
@@ -508,7 +509,7 @@ void EllipsoidSearch::draftNearPsnr() {
   };
   for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
     isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
-    if (draft_->cancelled() || isTooLarge_) return;
+    if (draft_->cancelled() || isTooLarge_ || draft_->fit.deviceFull) return;
     if (!slopeIsKnown_ && !isToned(job_) && next() > kFar * countOf(*draft_)) {
       const auto fewer = another(countOf(*draft_) / kFar);
       if (!fewer) return;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/parallel.h"
@@ -158,8 +159,22 @@ Field coarserField(const Field& field, int level) {
 
 // Its voxels.
 
-bool hasCoarserFields(const RevoxeliseOptions& voxels) {
-  return !voxels.restrictToBricks && !voxels.narrowBand;
+namespace {
+
+/// The range of the values if the rule names it, or else that of the intensities.
+bool isOnOneSide(const Field& field, const std::optional<ValueRange>& range) {
+  if (range) return range->min >= field.background || range->max <= field.background;
+  bool anyAbove = false, anyBelow = false;
+  for (const Chunk& chunk : field.chunks)
+    for (const float intensity : chunk.ellipsoids.intensity)
+      anyAbove |= intensity > 0.0f, anyBelow |= intensity < 0.0f;
+  return !(anyAbove && anyBelow);
+}
+
+}  // namespace
+
+bool hasCoarserFields(const Field& field, const RevoxeliseOptions& voxels) {
+  return !voxels.restrictToBricks && !voxels.narrowBand && isOnOneSide(field, voxels.range);
 }
 
 RevoxeliseOptions coarserRule(const RevoxeliseOptions& voxels, int level) {

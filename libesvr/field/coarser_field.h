@@ -26,8 +26,9 @@ struct PlaceMoments {
 [[nodiscard]] Field coarserField(const Field& field, int level);
 
 /// Whether the voxels of a rule have levels that are sums. If bricks or masks say which voxels there are,
-/// or inactive voxels have signs, coarser voxels are means of the finer ones instead.
-[[nodiscard]] bool hasCoarserFields(const RevoxeliseOptions& voxels);
+/// or inactive voxels have signs, coarser voxels are means of the finer ones instead. The same holds where values lie on
+/// both sides of the background: they cancel each other in a coarser voxel, which a threshold would take for empty.
+[[nodiscard]] bool hasCoarserFields(const Field& field, const RevoxeliseOptions& voxels);
 
 /// The rule by which the sums of a level become its voxels; apart from shareWithin().
 /// \param voxels  of level 0; hasCoarserFields()

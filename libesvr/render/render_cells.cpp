@@ -82,7 +82,7 @@ LazyCells::Level::Level(std::span<const Coord> bricks, std::uint32_t firstCells)
       cells(table.bricks.size()) {}
 
 LazyCells::LazyCells(const Field& field, const RevoxeliseOptions& voxels)
-    : field_(field), voxels_(voxels), coarserAreSums_(hasCoarserFields(voxels)) {
+    : field_(field), voxels_(voxels), coarserAreSums_(hasCoarserFields(field, voxels)) {
   if (coarserAreSums_) roughBox_ = roughBoxOf(field, voxels.box);
 }
 

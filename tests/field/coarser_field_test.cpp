@@ -169,9 +169,15 @@ TEST(CoarserField, ReachesAllThatDiffersInLevelZero) {
 }
 
 TEST(CoarserField, OnlyThresholdsWithoutABandHaveCoarserSums) {
-  EXPECT_TRUE(hasCoarserFields({.threshold = 0.1f}));
-  EXPECT_FALSE(hasCoarserFields({.narrowBand = true}));
-  EXPECT_FALSE(hasCoarserFields({.restrictToBricks = true}));
+  Field field = randomField({.count = 20});
+  const ValueRange above{0.0f, 1.0f}, around{-0.1f, 1.0f};
+  EXPECT_TRUE(hasCoarserFields(field, {.threshold = 0.1f, .range = above}));
+  EXPECT_FALSE(hasCoarserFields(field, {.range = above, .narrowBand = true}));
+  EXPECT_FALSE(hasCoarserFields(field, {.range = above, .restrictToBricks = true}));
+  EXPECT_FALSE(hasCoarserFields(field, {.range = around}));
+  EXPECT_FALSE(hasCoarserFields(field, {})) << "intensities of both signs";
+  for (float& i : field.chunks[0].ellipsoids.intensity) i = -std::abs(i);
+  EXPECT_TRUE(hasCoarserFields(field, {}));
 }
 
 }  // namespace

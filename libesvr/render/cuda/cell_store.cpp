@@ -196,7 +196,7 @@ class FieldStore final : public CellStore {
   /// Makes all levels at once, because the bricks of all are numbered together.
   void prepare(const LevelBounds& bounds) override {
     if (bounds.last == 0 || cells_.levelCount() == kLevels) return;
-    if (hasCoarserFields(voxels_))
+    if (hasCoarserFields(field_, voxels_))
       addSums();
     else
       addMeans();

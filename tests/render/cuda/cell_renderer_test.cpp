@@ -60,19 +60,24 @@ RenderOptions manyLevels() {
   return o;
 }
 
+/// Levels are sums where all values are on one side of the background, and means otherwise.
 TEST_F(CellsOnGpu, DrawTheLevelsOfFieldsAndVolumes) {
-  const Field field = manyBlobs();
-  const SparseVolume volume = revoxelise(field, kVoxels);
-  const auto drawn = renderer(field), ofVolume = makeVolumeRenderer(volume, device_);
-  RenderOptions flat = options();
-  flat.camera.projection = Projection::kOrthographic;
-  for (const double height : {1600.0, 3200.0, 6400.0, 12800.0, 25600.0}) {
-    flat.camera.height = height;
-    expectClose(drawn->draw(flat), renderField(field, flat, kVoxels));
-    expectClose(ofVolume->draw(flat), renderVolume(volume, flat));
+  for (const bool onOneSide : {true, false}) {
+    Field field = manyBlobs();
+    if (onOneSide)
+      for (float& i : field.chunks[0].ellipsoids.intensity) i = std::abs(i);
+    const SparseVolume volume = revoxelise(field, kVoxels);
+    const auto drawn = renderer(field), ofVolume = makeVolumeRenderer(volume, device_);
+    RenderOptions flat = options();
+    flat.camera.projection = Projection::kOrthographic;
+    for (const double height : {1600.0, 3200.0, 6400.0, 12800.0, 25600.0}) {
+      flat.camera.height = height;
+      expectClose(drawn->draw(flat), renderField(field, flat, kVoxels));
+      expectClose(ofVolume->draw(flat), renderVolume(volume, flat));
+    }
+    expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), kVoxels));
+    expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()));
   }
-  expectClose(drawn->draw(manyLevels()), renderField(field, manyLevels(), kVoxels));
-  expectClose(ofVolume->draw(manyLevels()), renderVolume(volume, manyLevels()));
 }
 
 TEST_F(CellsOnGpu, DrawTheVoxelsOfMasksWithinABox) {
