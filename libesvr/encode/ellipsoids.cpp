@@ -214,6 +214,8 @@ constexpr double kGrownFrom = 0.9;
 /// fits are made to come that near.
 constexpr double kNear = kMostGrowth * kGrownFrom;
 constexpr int kMostDrafts = 3;
+/// Whole fits of ellipsoids that take at most half of Tuning::bytesOfWholeFit, each of which has at most half of the iterations.
+constexpr int kMostSmallFits = 4;
 /// Largest number of ellipsoids of the first of them. Where it is farther from the PSNR than kFar times its number of
 /// ellipsoids, one with as many times fewer shows the slope.
 constexpr double kMostOfFirstDraft = 6000.0, kFar = 4.0;
@@ -508,8 +510,12 @@ void EllipsoidSearch::draftNearPsnr() {
     return made;
   };
   for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
+    if (draft_->fit.deviceFull) {  // no fit can have more, and seeds of more could not even begin
+      maxCount_ = std::min<std::uint64_t>(maxCount_, draft_->asked);
+      return;
+    }
     isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
-    if (draft_->cancelled() || isTooLarge_ || draft_->fit.deviceFull) return;
+    if (draft_->cancelled() || isTooLarge_) return;
     if (!slopeIsKnown_ && !isToned(job_) && next() > kFar * countOf(*draft_)) {
       const auto fewer = another(countOf(*draft_) / kFar);
       if (!fewer) return;
@@ -564,6 +570,8 @@ void EllipsoidSearch::forecast() {
   const double bytes =
       goal_.psnr ? price_ * countFor(drafted_, aim() - behind(), slope_) : double(*goal_.bytes);
   const double share = std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  // Of a few ellipsoids, one more or less may miss a PSNR (hydrogen_atom with 40 dB), and fits are short.
+  if (share <= 0.5) plan_.wholeFits = std::max(plan_.wholeFits, kMostSmallFits);
   plan_.wholeIterations = std::max(std::min(plan_.shortIterations, plan_.wholeIterations),
                                    std::uint32_t(share * plan_.wholeIterations));
   if (goal_.psnr)

@@ -54,8 +54,8 @@ struct Margin {
 };
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
-/// Plan::wholeFits whole fits are made (for a size up to five, if the ellipsoids of none before keep to
-/// it), and at most five short ones: four to find the number of ellipsoids, and one to decide about their
+/// Plan::wholeFits whole fits are made (up to four short ones if few ellipsoids suffice; for a size up to five, if
+/// the ellipsoids of none before keep to it), and at most five short ones: four to find the number of ellipsoids, and one to decide about their
 /// signs.
 class EllipsoidSearch {
  public:

@@ -4,8 +4,9 @@
 /// esvr-compare call it for every grid.
 ///
 /// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
-/// (three for Preset::kHigh and above the usual effort; for a size up to five, until one keeps to it),
-/// and at most five short ones, which forecast them, besides two that choose a tone curve.
+/// (three for Preset::kHigh and above the usual effort; four of at most half the length where ellipsoids take
+/// less than 2 KB; for a size up to five, until one keeps to it), and at most five short ones, which forecast
+/// them, besides two that choose a tone curve.
 
 #include <compare>
 #include <cstddef>
