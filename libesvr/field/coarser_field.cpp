@@ -182,7 +182,8 @@ RevoxeliseOptions coarserRule(const RevoxeliseOptions& voxels, int level) {
   // A mean of voxels of which some are below the threshold may be below it too. Divisors from 1 to 2^level
   // were tried: without one, thin tubes lose pieces, and with 2^level, faint space around objects stays
   // (docs/lab-notes.md). Beyond level 4, whole objects are smaller than a voxel, and would vanish.
-  coarser.threshold = voxels.threshold * float(std::exp2(-0.5 * level - 1.5 * std::max(level - 4, 0)));
+  coarser.threshold =
+      voxels.threshold * float(std::exp2(-0.5 * level - 1.5 * std::max(level - 4, 0)));
   const auto down = [level](Coord c) { return Coord{c.x >> level, c.y >> level, c.z >> level}; };
   coarser.box = {down(voxels.box.min), down(voxels.box.max)};
   coarser.alwaysActive = {};
