@@ -509,11 +509,12 @@ void EllipsoidSearch::draftNearPsnr() {
     if (!made) draft_->fit.end = FitEnd::kCancelled;
     return made;
   };
-  for (int drafts = 1; drafts < kMostDrafts; ++drafts) {
+  for (int drafts = 1;; ++drafts) {
     if (draft_->fit.deviceFull) {  // no fit can have more, and seeds of more could not even begin
       maxCount_ = std::min<std::uint64_t>(maxCount_, draft_->asked);
       return;
     }
+    if (drafts == kMostDrafts) return;
     isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
     if (draft_->cancelled() || isTooLarge_) return;
     if (!slopeIsKnown_ && !isToned(job_) && next() > kFar * countOf(*draft_)) {
