@@ -67,8 +67,8 @@ enum class Between {
 enum class LevelOfDetail {
   /// At distances at which a pixel is at least 3 x 2^l of a voxel's longest edges wide, voxels of
   /// 2^l x 2^l x 2^l are drawn, at steps that are 2^l times as long, for l up to 7. Pictures show fewer stray pixels,
-  /// take less time, and need less memory. Those of a volume, and of a field with masks, bricks or a narrow
-  /// band, are means of the voxels. Those of another field are sums of its ellipsoids, which are widened
+  /// take less time, and need less memory. Those of a volume, and of a field with masks, bricks, a narrow band
+  /// or values on both sides of the background, are means of the voxels. Those of another field are sums of its ellipsoids, which are widened
   /// as the mean would do (docs/math.md), so that a picture that shows coarser levels only decodes no
   /// voxel. A clip box has at least two voxels and two steps of a level along each axis, or the level is
   /// not used.

@@ -108,7 +108,7 @@ struct LevelBricks {
 struct CellFieldView {
   BrickTableView table;  ///< of level 0
   LevelBricks levels[kLevels];
-  int level;  ///< that of the CellField; what follows belongs to it
+  int level;  ///< level of the CellField, to which all that follows belongs
   const CellForm* forms;
   const KernelConstants<float>* kernels;
   std::uint32_t kernelStride;  ///< 0: one kernel for all ellipsoids; 1: one for each
@@ -174,7 +174,7 @@ class DeviceCells {
 
  private:
   std::vector<DeviceLevel> levels_;
-  std::vector<DeviceSums> sums_;  ///< of level 0, or of all levels
+  std::vector<DeviceSums> sums_;  ///< sums of level 0 alone, or of all levels
 };
 
 struct DecodeArguments {
