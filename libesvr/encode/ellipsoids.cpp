@@ -223,6 +223,8 @@ constexpr double kMostOfFirstDraft = 6000.0, kFar = 4.0;
 constexpr double kMostOfScout = 1000.0, kMostOfLargeScout = 2000.0, kBricksOfScout = 20.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
 constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
+/// The number of ellipsoids with which a frame begins, relative to that of the frame before (Lab, "Frames that continue").
+constexpr double kFewerInFrame = 0.95;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
 /// size is given up, and the share of a size that may stay unused: a hundredth.
 constexpr double kMoreEach = 1.25;
@@ -367,27 +369,35 @@ const Attempt* EllipsoidSearch::startFor(double count) const {
   return start;
 }
 
+std::uint32_t EllipsoidSearch::shareOfWhole(double share) const {
+  return std::max(std::uint32_t(share * plan_.wholeIterations), 1u);
+}
+
 /// A whole fit. Where it can continue an earlier one, it adds ellipsoids or drops the weakest, and has
 /// fewer iterations. The first fit for a size begins with seeds: of as many iterations, these give a
 /// better fit than a short one does (a plume of 20 KB: 0.7 dB), but one that is less like its forecast,
 /// by which a PSNR is found with one fit less.
 Attempt EllipsoidSearch::wholeFit(double count) const {
   FitOptions options = optionsFor(job_, count, plan_.wholeIterations);
-  const auto iterationsOf = [&](double share) {
-    return std::max(std::uint32_t(share * plan_.wholeIterations), 1u);
-  };
   const Attempt* from = startFor(double(*options.count));
   const bool isShort = from && draft_ && from == &*draft_;
   if (goal_.bytes && (!from || isShort)) {
-    if (!saturates_) options.iterations = iterationsOf(kTuning.sizedShare);
+    if (!saturates_) options.iterations = shareOfWhole(kTuning.sizedShare);
     return attempted(job_, options);
   }
   if (!from) return attempted(job_, options);
-  options.iterations = iterationsOf(isShort ? kTuning.continuedShare : kTuning.continuedWholeShare);
-  const bool grows = kGrownFrom * double(*options.count) >= double(from->count());
-  const StoredGrid fewer =
-      grows ? StoredGrid{} : heaviest(from->grid, std::size_t(kGrownFrom * double(*options.count)));
-  options.start = grows ? &from->grid.field : &fewer.field;
+  return continued(from->grid, count,
+                   isShort ? kTuning.continuedShare : kTuning.continuedWholeShare);
+}
+
+/// A fit that continues other ellipsoids. It adds some, or drops the weakest first.
+/// \param share  its share of the iterations of a whole fit
+Attempt EllipsoidSearch::continued(const StoredGrid& from, double count, double share) const {
+  FitOptions options = optionsFor(job_, count, shareOfWhole(share));
+  const auto begins = std::size_t(kGrownFrom * double(*options.count));
+  const bool grows = begins >= from.field.ellipsoidCount();
+  const StoredGrid fewer = grows ? StoredGrid{} : heaviest(from, begins);
+  options.start = grows ? &from.field : &fewer.field;
   return attempted(job_, options);
 }
 
@@ -437,6 +447,7 @@ double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded
 
 /// Quality of a whole fit less that of a short one, dB.
 double EllipsoidSearch::behind() const {
+  if (goal_.before) return 0.0;
   const double whole = plan_.wholeIterations, brief = plan_.shortIterations;
   if (!isToned(job_)) {
     const double usual = saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind;
@@ -533,6 +544,22 @@ void EllipsoidSearch::draftNearPsnr() {
   }
 }
 
+/// A fit that continues the ellipsoids of the frame before takes the place of the short ones, and is the first whole one.
+/// It has a few less, so that their number falls where fewer will do.
+void EllipsoidSearch::continueFrame() {
+  const StoredGrid& before = *goal_.before;
+  const auto hasNegative = [](const Chunk& chunk) {
+    return std::ranges::any_of(chunk.ellipsoids.intensity, [](float i) { return i < 0.0f; });
+  };
+  if (!options_.fit.bothSigns)
+    options_.fit.bothSigns = std::ranges::any_of(before.field.chunks, hasNegative);
+  const double bytes = double(bytesOfEllipsoids(before));
+  const double share = kTuning.continuedFrameShare * std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  draft_ = continued(before, capped(kFewerInFrame * double(before.field.ellipsoidCount())), share);
+  drafted_ = {pointOf(*draft_)};
+  attempts_ = {*draft_};
+}
+
 /// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each other
 /// need more bits, so that the PSNR alone would not do.
 double EllipsoidSearch::qualityForBytes(const Attempt& attempt) const {
@@ -583,11 +610,13 @@ void EllipsoidSearch::forecast() {
 void EllipsoidSearch::draft(const CancelToken* cancel) {
   const CancelToken* own = options_.fit.cancel;
   if (cancel) options_.fit.cancel = cancel;
-  if (goal_.psnr)
+  if (goal_.before)
+    continueFrame();
+  else if (goal_.psnr)
     draftNearPsnr();
   else
     draft_ = shortFit(firstCount(job_));
-  if (!goal_.below || mayStayBelow(*goal_.below)) decideSigns();
+  if (!goal_.before && (!goal_.below || mayStayBelow(*goal_.below))) decideSigns();
   forecast();
   options_.fit.cancel = own;
 }
@@ -640,7 +669,7 @@ bool EllipsoidSearch::isEnough() const {
 
 /// A short fit that has all iterations of a whole one is the first of the whole fits.
 std::optional<Conversion> EllipsoidSearch::runToPsnr() {
-  if (!draft_->cancelled() && plan_.wholeIterations <= plan_.shortIterations)
+  if (!draft_->cancelled() && attempts_.empty() && plan_.wholeIterations <= plan_.shortIterations)
     attempts_.push_back(*draft_);
   for (int fits = 0; fits < plan_.wholeFits && !draft_->cancelled() && !isEnough(); ++fits) {
     const double count = capped(std::max(std::floor(nextCount()), leastAfterMisses()));

@@ -56,7 +56,7 @@ struct Margin {
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
 /// Plan::wholeFits whole fits are made (up to four short ones if few ellipsoids suffice; for a size up to five, if
 /// the ellipsoids of none before keep to it), and at most five short ones: four to find the number of ellipsoids, and one to decide about their
-/// signs.
+/// signs. A frame of a sequence continues the ellipsoids of the frame before instead of making short fits.
 class EllipsoidSearch {
  public:
   struct Goal {
@@ -66,6 +66,8 @@ class EllipsoidSearch {
     /// Bytes that the grid must stay below to be of use, with a PSNR. Fits end early where the grid
     /// would not.
     std::optional<std::uint64_t> below{};
+    const StoredGrid* before =
+        nullptr;  ///< the ellipsoids to continue, with a PSNR; null: there are none
   };
 
   EllipsoidSearch(const Job& job, const Goal& goal);
@@ -103,6 +105,8 @@ class EllipsoidSearch {
   [[nodiscard]] Attempt shortFit(double count) const;
   [[nodiscard]] double firstCountForPsnr() const;
   [[nodiscard]] Attempt wholeFit(double count) const;
+  [[nodiscard]] std::uint32_t shareOfWhole(double share) const;
+  [[nodiscard]] Attempt continued(const StoredGrid& from, double count, double share) const;
   [[nodiscard]] const Attempt* startFor(double count) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
@@ -110,6 +114,7 @@ class EllipsoidSearch {
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void learnFrom(const Attempt& other);
   void draftNearPsnr();
+  void continueFrame();
   void decideSigns();
   void forecast();
 

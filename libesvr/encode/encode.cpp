@@ -297,6 +297,21 @@ std::optional<double> boundOf(const Goal& goal, const SparseVolume& source) {
   return std::nullopt;
 }
 
+/// True for the goals that are a quality: a preset, and a PSNR of values or of pictures.
+bool isQuality(const Goal& goal) {
+  return std::holds_alternative<PresetGoal>(goal) || std::holds_alternative<PsnrGoal>(goal) ||
+         std::holds_alternative<PictureGoal>(goal);
+}
+
+/// The quality of a goal that is one, dB, as the job measures it.
+double qualityOf(const Job& job) {
+  if (const auto* psnr = std::get_if<PsnrGoal>(&job.options.goal)) return psnr->psnr;
+  if (const auto* pictures = std::get_if<PictureGoal>(&job.options.goal)) return pictures->psnr;
+  const Preset preset = job.options.fit.preset;
+  return seesPictures(job) ? presetPicturePsnr(preset)
+                           : presetPsnr(preset) + boxGain(job.input.source, job.options);
+}
+
 /// Calls the conversion that belongs to a goal.
 class Converter {
  public:
@@ -308,22 +323,16 @@ class Converter {
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
     const Job job{job_.input, options, job_.judge, job_.scout};
-    const double psnr = seesPictures(job)
-                            ? presetPicturePsnr(options.fit.preset)
-                            : presetPsnr(options.fit.preset) + boxGain(job.input.source, options);
-    return Choice(job, {.psnr = psnr}).forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
+    return Choice(job, {.psnr = qualityOf(job)})
+        .forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
       throw UsageError("a size needs compact storage; the size of float32 storage is fixed");
     return Choice(job_, {.bytes = goal.bytes}).forSize();
   }
-  Conversion operator()(const PsnrGoal& goal) const {
-    return Choice(job_, {.psnr = goal.psnr}).forPsnr(1.0, kSmallForPsnr);
-  }
-  Conversion operator()(const PictureGoal& goal) const {
-    return Choice(job_, {.psnr = goal.psnr}).forPsnr(1.0, kSmallForPsnr);
-  }
+  Conversion operator()(const PsnrGoal&) const { return forPsnr(); }
+  Conversion operator()(const PictureGoal&) const { return forPsnr(); }
   Conversion operator()(const BoundGoal& goal) const {
     const SparseVolume& source = job_.input.source;
     const double bound = absoluteBound(goal, source);
@@ -353,6 +362,10 @@ class Converter {
   /// Bytes of voxels below which no ellipsoids are tried for a PSNR, because little could be saved.
   static constexpr std::uint64_t kSmallForPsnr = 512;
 
+  [[nodiscard]] Conversion forPsnr() const {
+    return Choice(job_, {.psnr = qualityOf(job_)}).forPsnr(1.0, kSmallForPsnr);
+  }
+
   [[nodiscard]] Conversion asVoxels(VoxelLayer layer) const {
     Conversion conversion;
     conversion.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(layer));
@@ -367,6 +380,31 @@ class Converter {
 
   Job job_;
 };
+
+Conversion convertToGoal(const Job& job) { return std::visit(Converter(job), job.options.goal); }
+
+/// A frame whose ellipsoids continue those of the frame before.
+/// \return nothing if it misses the quality, or takes many more bytes than the frame before
+std::optional<Conversion> continueFrame(const Job& job) {
+  constexpr double kMostFrameGrowth = 1.5;
+  const StoredGrid& before = *job.options.previous;
+  const double wanted = qualityOf(job);
+  if (isConstant(job.input.source)) return std::nullopt;
+  EllipsoidSearch search(job, {.psnr = wanted, .before = &before});
+  std::optional<Conversion> made;
+  const double seconds = secondsOf([&] {
+    search.draft();
+    made = search.run();
+  });
+  if (!made) return std::nullopt;
+  const double reached = search.reached() ? *search.reached() : psnrOf(job, *made);
+  const Candidate figures{bytesOfEllipsoids(made->grid), reached, false, seconds};
+  const double most = kMostFrameGrowth * double(bytesOfEllipsoids(before));
+  const bool isGood = reached >= wanted && double(figures.bytes) <= most;
+  if (!isGood && !isCancelled(job)) return std::nullopt;
+  made->choice = ChoiceRecord{{}, figures};
+  return made;
+}
 
 // ---- What a stored grid promises
 
@@ -493,12 +531,22 @@ std::optional<std::uint64_t> smallerExactBytes(const Job& job, const StoredGrid&
 /// True if a grid should hold voxels because its predecessor does. The difference from it takes few
 /// bytes, so that no fit is made for comparison.
 bool keepsVoxels(const ConvertOptions& options) {
-  const bool hasQuality = std::holds_alternative<PresetGoal>(options.goal) ||
-                          std::holds_alternative<PsnrGoal>(options.goal) ||
-                          std::holds_alternative<PictureGoal>(options.goal);
-  return options.previous && options.previous->voxels && hasQuality &&
+  return options.previous && options.previous->voxels && isQuality(options.goal) &&
          options.representation == Representation::kAuto &&
          options.storage.form == Storage::kCompact;
+}
+
+/// The ellipsoids of the frame before, if a frame is to continue them; null otherwise.
+const StoredGrid* ellipsoidsBefore(const ConvertInput& input, const ConvertOptions& options) {
+  const StoredGrid* before = options.previous;
+  if (!before || !options.keepsPastErrors || before->voxels || !isQuality(options.goal))
+    return nullptr;
+  const bool isAlike = before->field.ellipsoidCount() > 0 &&
+                       before->field.background == input.source.background &&
+                       options.tone.value_or(before->tone) == before->tone;
+  const bool mayContinue = options.representation != Representation::kVoxels &&
+                           options.storage.form == Storage::kCompact && !options.fit.narrowBand;
+  return isAlike && mayContinue ? before : nullptr;
 }
 
 /// The mean of the active values, within their range.
@@ -597,8 +645,10 @@ std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptio
 }
 
 /// Converts a volume that is judged by pictures, or by the values of its tones.
-Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
-                         const ToneChoice& choice) {
+/// \param convert  makes a grid of the tones; convertToGoal() or continueFrame()
+template <class Convert>
+std::optional<Conversion> convertJudged(const ConvertInput& given, ConvertOptions options,
+                                        const ToneChoice& choice, const Convert& convert) {
   const ToneCurve tone = choice.tone;
   const Judge judge(given, options, tone);
   GridDescriptor descriptor = given.descriptor;
@@ -620,17 +670,33 @@ Conversion convertJudged(const ConvertInput& given, ConvertOptions options,
   }
   const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
   const Job job{input, options, &judge, choice.scout};
-  Conversion conversion = std::visit(Converter(job), options.goal);
-  conversion.smallerExactBytes =
-      unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
-  if (tone.isOn()) setTone(given, tone, conversion.grid);
-  if (conversion.fit.end != FitEnd::kCancelled)
-    measureLayers(given, conversion.grid);
+  std::optional<Conversion> made = convert(job);
+  if (!made) return std::nullopt;
+  made->smallerExactBytes = unlessCancelled([&] { return smallerExactBytes(job, made->grid); });
+  if (tone.isOn()) setTone(given, tone, made->grid);
+  if (made->fit.end != FitEnd::kCancelled)
+    measureLayers(given, made->grid);
   else
-    conversion.grid.layerErrors.clear();
-  conversion.byPictures = judge.seesPictures();
-  conversion.grid = throughTheFormat(std::move(conversion.grid), previous, memoryOf(given.source));
-  return conversion;
+    made->grid.layerErrors.clear();
+  made->byPictures = judge.seesPictures();
+  made->grid = throughTheFormat(std::move(made->grid), previous, memoryOf(given.source));
+  return made;
+}
+
+/// Converts a volume with a tone curve or none. \param convert  as in convertJudged()
+template <class Convert>
+std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput& input,
+                                    const ConvertOptions& options, const Convert& convert) {
+  if (choice.tone.isOn() || Judge::seesPictures(input, options))
+    return convertJudged(input, options, choice, convert);
+  const Job job{input, options};
+  std::optional<Conversion> made =
+      options.fit.narrowBand ? convertNarrowBand(job, convertToGoal) : convert(job);
+  if (!made) return std::nullopt;
+  made->smallerExactBytes = unlessCancelled([&] { return smallerExactBytes(job, made->grid); });
+  made->grid = throughTheFormat(std::move(made->grid), options.previous, memoryOf(input.source));
+  requirePromises(job, made->grid);
+  return made;
 }
 
 // ---- Conversions
@@ -649,22 +715,13 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
     if (auto made = convertSurface(input, own)) return std::move(*made);
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
   own.representation = possibleRepresentation(input, own);
-  const auto convertTo = [](const Job& job) {
-    return std::visit(Converter(job), job.options.goal);
-  };
   if (std::holds_alternative<PictureGoal>(own.goal) && !Judge::seesPictures(input, own))
     own.goal = PresetGoal{};
-  const ToneChoice choice = chooseTone(input, own);
-  if (choice.tone.isOn() || Judge::seesPictures(input, own))
-    return convertJudged(input, own, choice);
-  const Job job{input, own};
-  Conversion conversion = own.fit.narrowBand ? convertNarrowBand(job, convertTo) : convertTo(job);
-  conversion.smallerExactBytes =
-      unlessCancelled([&] { return smallerExactBytes(job, conversion.grid); });
-  conversion.grid =
-      throughTheFormat(std::move(conversion.grid), own.previous, memoryOf(input.source));
-  requirePromises(job, conversion.grid);
-  return conversion;
+  if (const StoredGrid* before = ellipsoidsBefore(input, own)) {
+    if (auto made = convertBy({before->tone}, input, own, continueFrame)) return std::move(*made);
+    own.previous = nullptr;  // it is another scene
+  }
+  return *convertBy(chooseTone(input, own), input, own, convertToGoal);
 }
 
 PaperConversion convertedByPaper(const ConvertInput& input, const PaperFitOptions& options,

@@ -47,6 +47,8 @@ struct Tuning {
   /// Share of a whole fit's iterations that a fit has which continues a short one, and which continues a
   /// whole one (Lab, "Continued fits").
   double continuedShare = 0.4, continuedWholeShare = 0.15;
+  /// The same of a fit that continues the ellipsoids of the frame before (Lab, "Frames that continue").
+  double continuedFrameShare = 0.3;
   /// The same of a fit from seeds for a size, unless many voxels saturate.
   double sizedShare = 0.6;
   /// Bricks up to which a whole fit on the CPU has all iterations of its preset; larger volumes have

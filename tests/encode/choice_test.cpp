@@ -1,6 +1,7 @@
 // Plan: for each goal, one volume is converted for which ellipsoids are better and one for which
 // voxels are better. The better representation is stored, and the record of the choice has the
-// figures of both. Each representation can be prescribed. Contradictory options are refused.
+// figures of both. Each representation can be prescribed. Contradictory options are refused. A frame continues the
+// ellipsoids of the frame before with one fit, and is searched anew where the scene changes.
 
 #include <gtest/gtest.h>
 
@@ -177,6 +178,53 @@ TEST(ChoiceForAPreset, StoresAConstantInAFewBytes) {
   const Conversion conversion = choose(flat, PresetGoal{});
   EXPECT_EQ(decodeGrid(conversion.grid).values, flat.values);
   EXPECT_LT(bytesAdded(conversion.grid), 600u);
+}
+
+/// A conversion of blobs or of a frame after them, and the number of ellipsoids with which its first fit begins.
+struct Frame {
+  Conversion conversion;
+  std::optional<std::size_t> begins;
+};
+Frame frameOf(const SparseVolume& volume, const StoredGrid* previous) {
+  Frame made;
+  ConvertOptions options;
+  options.goal = PsnrGoal{35.0};
+  options.fit.iterations = 200;
+  options.fit.kappa = 0.0f;
+  options.fit.progress = [&](const FitProgress& progress) {
+    if (!made.begins) made.begins = progress.point.ellipsoids;
+  };
+  options.previous = previous;
+  made.conversion = convertVolume({{}, volume}, options);
+  return made;
+}
+
+TEST(ChoiceForAFrame, SlowContinuesTheEllipsoidsOfTheFrameBefore) {
+  const Frame first = frameOf(test::smoothVolume(), nullptr);
+  ASSERT_FALSE(first.conversion.grid.voxels);
+  const SparseVolume moved = test::smoothVolume(1.0);
+  const Frame alone = frameOf(moved, nullptr), next = frameOf(moved, &first.conversion.grid);
+  const double before = double(first.conversion.grid.field.ellipsoidCount());
+  EXPECT_NEAR(double(*next.begins), 0.855 * before, 1.0 + 0.01 * before);
+  EXPECT_GT(double(*alone.begins), before) << "a search of its own begins with another number";
+  ASSERT_FALSE(next.conversion.grid.voxels);
+  EXPECT_FALSE(next.conversion.choice->voxels) << "no voxels are tried";
+  EXPECT_EQ(next.conversion.fit.end, FitEnd::kPsnrReached);
+  EXPECT_GE(psnrOver(moved, next.conversion), 35.0);
+  EXPECT_LT(double(bytesAdded(next.conversion.grid)),
+            1.1 * double(bytesAdded(alone.conversion.grid)));
+}
+
+TEST(ChoiceForAFrame, SlowIsSearchedAnewWhereTheSceneChanges) {
+  const Frame blobs = frameOf(test::smoothVolume(), nullptr);
+  ASSERT_FALSE(blobs.conversion.grid.voxels);
+  const SparseVolume noise = test::noiseVolume(2);
+  const Frame alone = frameOf(noise, nullptr), next = frameOf(noise, &blobs.conversion.grid);
+  ASSERT_TRUE(next.conversion.grid.voxels);
+  EXPECT_EQ(next.conversion.grid.voxels->codes, alone.conversion.grid.voxels->codes);
+  // A constant takes a few bytes as voxels, whatever was there before.
+  const SparseVolume constant = test::volumeOf({}, 2, 0.0f, [](Coord) { return 1.0f; });
+  EXPECT_TRUE(frameOf(constant, &blobs.conversion.grid).conversion.grid.voxels);
 }
 
 TEST(Choice, SlowVoxelsKeepTheMaskOfALevelSetOnly) {

@@ -107,6 +107,22 @@ TEST(Tone, ReachesTheQualityOfPictures) {
   }
 }
 
+TEST(Tone, OfAFrameIsThatOfTheFrameBefore) {
+  SparseVolume volume = smoke();
+  ConvertOptions options{.goal = PictureGoal{33.0}, .representation = Representation::kEllipsoids};
+  options.tone = ToneCurve{0.3f};
+  const Conversion first = shortlyFitted(volume, options);
+  options.tone.reset();
+  options.previous = &first.grid;
+  for (float& v : volume.values) v *= 1.05f;
+  const Conversion next = shortlyFitted(volume, options);
+  EXPECT_EQ(next.grid.tone.scale, 0.3f);
+  EXPECT_GE(seen(volume, next.grid), 33.0);
+  // An option decides before the frame does.
+  options.tone = ToneCurve{};
+  EXPECT_FALSE(shortlyFitted(volume, options).grid.tone.isOn());
+}
+
 TEST(Tone, OfAPresetLimitsTheErrorOfValuesToo) {
   const SparseVolume volume = smoke();
   const Conversion made = shortlyFitted(volume, {.goal = PresetGoal{}});

@@ -14,12 +14,12 @@ inline SparseVolume noiseVolume(int bricks) {
   return volumeOf({}, bricks, 0.0f, [&](Coord) { return float(random(0.5, 1.0)); });
 }
 
-/// Sixteen blobs that are a few voxels wide.
-inline SparseVolume smoothVolume() {
+/// Sixteen blobs that are a few voxels wide. \param moved  voxels by which they have moved along x
+inline SparseVolume smoothVolume(double moved = 0.0) {
   Random random(5);
   std::array<std::array<double, 4>, 16> blobs;  // center and width
   for (auto& [x, y, z, width] : blobs)
-    x = random(5, 43), y = random(5, 43), z = random(5, 43), width = random(3, 6);
+    x = random(5, 43) + moved, y = random(5, 43), z = random(5, 43), width = random(3, 6);
   return volumeOf({}, 6, 0.0f, [&](Coord v) {
     double sum = 0.0;
     for (const auto& [x, y, z, width] : blobs)

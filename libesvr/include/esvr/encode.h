@@ -158,8 +158,9 @@ struct ConvertOptions {
   /// The same grid of the decoded previous frame of a sequence; null: the grid stands alone. Bytes
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
   /// Another grid that this one refers to in its file may take its place.
-  /// If it holds voxels, Representation::kAuto stores voxels for a PresetGoal and a PsnrGoal, so that
-  /// only the first frame of a group takes the time of a fit.
+  /// For a goal that is a quality, a frame has the representation and the tone curve of the frame before: voxels
+  /// are predicted from its voxels, and a fit continues its ellipsoids, in about two thirds of the time of a search. Where that
+  /// takes many more bytes, or misses the goal, the frame is converted as if it stood alone.
   const StoredGrid* previous = nullptr;
   /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
   /// convertVolume() where the source has values that are not finite.
