@@ -12,6 +12,7 @@
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "esvr/resolution.h"
 #include "format/section_table.h"
 
 namespace esvr::encode {
@@ -67,7 +68,8 @@ Plan planOf(const Job& job) {
   const Tuning& tuning = kTuning;
   const int effort = job.options.effort;
   const double wanted = plannedIterations(job.options.fit);
-  const double bricks = double(std::max<std::size_t>(job.input.source.brickCount(), 1));
+  const SparseVolume& fitted = job.averages ? *job.averages : job.input.source;
+  const double bricks = double(std::max<std::size_t>(fitted.brickCount(), 1));
   const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;
   const double shortest = std::min<double>(tuning.leastShortIterations, wanted);
   const double inTime = onGpu ? wanted : wanted * tuning.bricksOfWholeFit / bricks;
@@ -225,6 +227,10 @@ constexpr double kMostOfScout = 1000.0, kMostOfLargeScout = 2000.0, kBricksOfSco
 constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
 /// The number of ellipsoids with which a frame begins, relative to that of the frame before (Lab, "Frames that continue").
 constexpr double kFewerInFrame = 0.95;
+/// Active voxels for each ellipsoid from which on fits to averages are tried, the largest number of iterations of a whole
+/// one, and the largest share of the squared error that averaging may have (Lab, "Fits to averages").
+constexpr double kVoxelsOfAverages = 800.0, kMostOfAveraging = 0.5;
+constexpr std::uint32_t kMostIterationsOfAverages = 1000;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
 /// size is given up, and the share of a size that may stay unused: a hundredth.
 constexpr double kMoreEach = 1.25;
@@ -312,10 +318,21 @@ FitOptions optionsFor(const Job& job, double count, std::uint32_t iterations) {
   return options;
 }
 
+/// A fit to the input of a job, or to its averages. Its field and that of options.start are among the voxels of the input.
+FitResult fitted(const Job& job, FitOptions options) {
+  if (!job.averages) return fit(job.input.source, options);
+  Field start;
+  if (options.start) start = amongOtherVoxels(*options.start, kAveraged), options.start = &start;
+  if (!options.peak) options.peak = peakOf(job.input.source);
+  FitResult made = fit(*job.averages, options);
+  made.field = amongOtherVoxels(std::move(made.field), 1.0 / kAveraged);
+  return made;
+}
+
 Attempt attempted(const Job& job, const FitOptions& options) {
   Attempt result;
   result.asked = *options.count;
-  result.fit = fit(job.input.source, options);
+  result.fit = fitted(job, options);
   result.grid = storedGridOf(job, result.fit);
   const auto judged = unlessCancelled([&]() -> std::optional<Judge::Judgement> {
     if (result.cancelled()) return std::nullopt;
@@ -509,11 +526,66 @@ double EllipsoidSearch::firstCountForPsnr() const {
   return goal_.below ? std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach) : guess;
 }
 
+// Large ellipsoids are fitted to averages, whose iterations take a seventh of the time. Iterations of all voxels after
+// them gain nothing (Lab, "Fits to averages").
+
+/// True if ellipsoids may be so large that averages show them as well as voxels do.
+bool EllipsoidSearch::mayFitAverages(double count) const {
+  const FitOptions& fit = options_.fit;
+  const double voxels = double(activeVoxelCount(job_.input.source));
+  return !fit.box && !options_.filled && !fit.narrowBand && !saturates_ &&
+         voxels >= kVoxelsOfAverages * count;
+}
+
+/// The share of the squared error of a fit to averages that is due to the averaging: its error over the averages is less
+/// by the variance within these.
+double EllipsoidSearch::shareOfAveraging(const Attempt& attempt) const {
+  const SparseVolume& source = job_.input.source;
+  const double peak = options_.fit.peak ? *options_.fit.peak : peakOf(source);
+  const double psnr =
+      psnrOverBox(source, decodeGrid(attempt.grid, {.memory = memoryOf(source)}), {.peak = peak});
+  return 1.0 - std::pow(10.0, (psnr - lastPsnr(attempt.fit)) / 10.0);
+}
+
+/// Whether averages will do for the quality of the goal, by the short fit. The error that is due to them stays.
+bool EllipsoidSearch::averagesSuffice() const {
+  if (!job_.averages || draft_->cancelled()) return true;
+  const double less = (aim() - draft_->psnr) / rounding_.factor;  // dB over the box
+  return shareOfAveraging(*draft_) * std::pow(10.0, less / 10.0) <= kMostOfAveraging;
+}
+
+void EllipsoidSearch::fitAverages() {
+  averages_ = coarsened(job_.input.source, kAveraged);
+  job_.averages = &averages_;
+  plan_ = planOf(job_);
+  plan_.wholeIterations = std::min(plan_.wholeIterations, kMostIterationsOfAverages);
+}
+
+/// Makes all further fits to the voxels themselves.
+void EllipsoidSearch::fitVoxels() {
+  job_.averages = nullptr, averages_ = {};
+  const Plan plan = planOf(job_);
+  plan_.wholeIterations = std::min(plan_.wholeIterations, plan.wholeIterations);
+  plan_.shortIterations = std::min(plan_.shortIterations, plan.shortIterations);
+  plan_.improves = plan.improves;
+}
+
+void EllipsoidSearch::draftFirst() {
+  const double count = capped(firstCountForPsnr());
+  if (mayFitAverages(count)) fitAverages();
+  draft_ = shortFit(count);
+  if (!averagesSuffice()) {
+    job_.scout = pointOf(*draft_);
+    fitVoxels();
+    draft_ = shortFit(capped(firstCountForPsnr()));
+  }
+  drafted_ = {pointOf(*draft_)};
+}
+
 /// A short fit whose number of ellipsoids is near the one that the PSNR needs. The first guess can be
 /// far from it, where signs and prices differ.
 void EllipsoidSearch::draftNearPsnr() {
-  draft_ = shortFit(capped(firstCountForPsnr()));
-  drafted_ = {pointOf(*draft_)};
+  draftFirst();
   const auto next = [&] { return capped(kGrownFrom * nextCount()); };
   const auto another = [&](double count) {
     auto made = unlessCancelled([&]() -> std::optional<Attempt> { return shortFit(count); });
@@ -555,7 +627,13 @@ void EllipsoidSearch::continueFrame() {
     options_.fit.bothSigns = std::ranges::any_of(before.field.chunks, hasNegative);
   const double bytes = double(bytesOfEllipsoids(before));
   const double share = kTuning.continuedFrameShare * std::min(1.0, bytes / kTuning.bytesOfWholeFit);
-  draft_ = continued(before, capped(kFewerInFrame * double(before.field.ellipsoidCount())), share);
+  const double count = capped(kFewerInFrame * double(before.field.ellipsoidCount()));
+  if (mayFitAverages(count)) fitAverages();
+  draft_ = continued(before, count, share);
+  if (!averagesSuffice()) {
+    fitVoxels();
+    draft_ = continued(before, count, share);
+  }
   drafted_ = {pointOf(*draft_)};
   attempts_ = {*draft_};
 }
@@ -672,6 +750,9 @@ std::optional<Conversion> EllipsoidSearch::runToPsnr() {
   if (!draft_->cancelled() && attempts_.empty() && plan_.wholeIterations <= plan_.shortIterations)
     attempts_.push_back(*draft_);
   for (int fits = 0; fits < plan_.wholeFits && !draft_->cancelled() && !isEnough(); ++fits) {
+    const bool isMissed = !attempts_.empty() && leastAfterMisses() > 1.0;
+    if (isMissed && job_.averages && shareOfAveraging(attempts_.back()) > kMostOfAveraging)
+      fitVoxels();
     const double count = capped(std::max(std::floor(nextCount()), leastAfterMisses()));
     const bool isRepeated =
         std::ranges::any_of(attempts_, [&](const Attempt& a) { return double(a.asked) == count; });

@@ -114,6 +114,12 @@ class EllipsoidSearch {
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void learnFrom(const Attempt& other);
   void draftNearPsnr();
+  void draftFirst();
+  [[nodiscard]] bool mayFitAverages(double count) const;
+  [[nodiscard]] double shareOfAveraging(const Attempt& attempt) const;
+  [[nodiscard]] bool averagesSuffice() const;
+  void fitAverages();
+  void fitVoxels();
   void continueFrame();
   void decideSigns();
   void forecast();
@@ -130,6 +136,7 @@ class EllipsoidSearch {
   [[nodiscard]] Conversion smallestOrBest();
 
   ConvertOptions options_;
+  SparseVolume averages_;
   Job job_;
   Goal goal_;
   Plan plan_;

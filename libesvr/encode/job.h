@@ -24,7 +24,11 @@ struct Job {
   const Judge* judge = nullptr;  ///< null: quality is the PSNR over the box
   /// What the fit showed by which the tone curve was chosen. The number of ellipsoids of the first short fit follows from it.
   std::optional<FitPoint> scout{};
+  /// The averages of kAveraged^3 voxels of the input, to which ellipsoids are fitted in its place; null: they are fitted to
+  /// the input. They are always judged with the input.
+  const SparseVolume* averages = nullptr;
 };
+inline constexpr int kAveraged = 2;
 
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.
 [[nodiscard]] bool isCancelled(const Job& job);

@@ -385,7 +385,7 @@ SparseVolume interpolated(const StoredGrid& grid, double factor, const DecodeOpt
   StoredGrid finer = grid;
   finer.quantised.clear();
   finer.boxVoxels.clear();
-  for (Chunk& chunk : finer.field.chunks) chunk = finerChunk(chunk, factor);
+  finer.field = amongOtherVoxels(std::move(finer.field), factor);
   finer.activeBox = finerBox(grid.activeBox, factor);
   DecodeOptions own = options;
   if (options.box) own.box = finerBox(*options.box, factor);
@@ -440,6 +440,11 @@ VectorGrid decodeVectorAtResolution(const std::string& name, StoredComponents co
   }
   vectors.descriptor.name = name;
   return vectors;
+}
+
+Field amongOtherVoxels(Field field, double factor) {
+  for (Chunk& chunk : field.chunks) chunk = finerChunk(chunk, factor);
+  return field;
 }
 
 ResolutionBytes bytesAtResolution(const StoredGrid& grid, double factor,

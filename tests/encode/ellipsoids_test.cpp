@@ -1,6 +1,6 @@
 // Plan: the search for ellipsoids of a PSNR continues its short fit and its first whole fit instead of
 // beginning again with seeds, and makes no more whole fits than it promises. A search that is cancelled
-// keeps its best fit. Forecasts say where ellipsoids cannot win. Intensities have both signs where this is
+// keeps its best fit. Large ellipsoids are fitted to averages of voxels where these suffice. Forecasts say where ellipsoids cannot win. Intensities have both signs where this is
 // better, and only there: a gyroid with a plateau is such a volume; smooth blobs are not.
 
 #include "encode/ellipsoids.h"
@@ -16,6 +16,7 @@
 #include "encode/volumes.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
+#include "esvr/field.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 
@@ -34,8 +35,11 @@ struct Searched {
   ConvertInput input{descriptor, volume};
   EllipsoidSearch search;
 
-  Searched(SparseVolume of, ConvertOptions with, const EllipsoidSearch::Goal& goal)
-      : volume(std::move(of)), options(std::move(with)), search({input, options}, goal) {}
+  Searched(SparseVolume of, ConvertOptions with, const EllipsoidSearch::Goal& goal,
+           std::optional<encode::FitPoint> scout = {})
+      : volume(std::move(of)),
+        options(std::move(with)),
+        search({input, options, nullptr, scout}, goal) {}
 };
 
 ConvertOptions ofIterations(std::uint32_t iterations) {
@@ -72,6 +76,34 @@ TEST(EllipsoidSearch, MakesNoMoreWholeFitsThanItPromises) {
   fits = 0;
   EXPECT_EQ(made.search.run()->fit.end, FitEnd::kPsnrMissed);
   EXPECT_LE(fits, encode::planOf({made.input, made.options}).wholeFits);
+}
+
+TEST(EllipsoidSearch, SlowFitsLargeEllipsoidsToAveragesWhereTheseSuffice) {
+  const auto wide = test::volumeOf({}, 10, 0.0f, [](Coord v) {
+    double sum = 0.0;
+    for (int p = 0; p < 14; ++p) {
+      const double r =
+          std::hypot(v.x - 40.0 - 25.0 * std::cos(1.9 * p), v.y - 40.0 - 25.0 * std::sin(2.3 * p),
+                     v.z - 40.0 - 25.0 * std::sin(1.1 * p + 1.0)) /
+          (8.0 + 0.3 * p);
+      sum += std::exp(-0.5 * r * r);
+    }
+    return float(sum);
+  });
+  // The blobs of smoothVolume() are 3 to 6 voxels wide, and those of `wide` 8 to 12.
+  for (const bool isWide : {true, false}) {
+    ConvertOptions options = ofIterations(200);
+    options.fit.kappa = 0.0f;
+    const double psnr = isWide ? 33.0 : 45.0;
+    Searched made(isWide ? wide : test::smoothVolume(), options, {.psnr = psnr},
+                  encode::FitPoint{isWide ? 20.0 : 60.0, psnr - 1.0});
+    made.search.draft();
+    const auto found = made.search.run();
+    EXPECT_EQ(found->fit.end, FitEnd::kPsnrReached);
+    EXPECT_GE(psnrOverBox(made.volume, decodeGrid(found->grid)), psnr);
+    const double share = double(found->fit.pairs) / estimateWork(found->grid.field).pairs;
+    EXPECT_EQ(share < 0.5, isWide) << share << " of the pairs of an ellipsoid and a brick";
+  }
 }
 
 TEST(EllipsoidSearch, KeepsItsFirstFitWhereItIsCancelled) {

@@ -278,6 +278,28 @@ TEST(Finer, EllipsoidsAreEvaluatedBetweenVoxels) {
   }
 }
 
+TEST(Field, AmongOtherVoxelsHasItsValuesAtTheSamePlaces) {
+  ConvertOptions options;
+  options.goal = FitGoal{};
+  options.representation = Representation::kEllipsoids;
+  options.fit.count = 20;
+  options.fit.iterations = 40;
+  const Field field = convertVolume({descriptorOf(), soft()}, options).grid.field;
+  std::vector<Place> places;
+  for (int n = 0; n < 200; ++n) places.push_back({0.17 * n, 24.0 - 0.11 * n, 5.0 + 0.07 * n});
+  std::vector<float> expected(places.size()), values(places.size());
+  evaluatePlaces(field, places, expected);
+  EXPECT_GT(*std::ranges::max_element(expected), 0.1f);
+  for (const double r : {2.0, 0.5}) {
+    std::vector<Place> others;
+    for (const auto& [x, y, z] : places)
+      others.push_back({(x + 0.5) / r - 0.5, (y + 0.5) / r - 0.5, (z + 0.5) / r - 0.5});
+    evaluatePlaces(amongOtherVoxels(field, r), others, values);
+    // As above; the logarithms of scales are rounded to 2e-7 of themselves.
+    for (std::size_t i = 0; i < places.size(); ++i) EXPECT_NEAR(values[i], expected[i], 5e-4);
+  }
+}
+
 TEST(Finer, VoxelsAndMasksAreRefusedByName) {
   EXPECT_THAT([] { (void)decodeAtResolution(exactOf(soft()), 0.5); },
               ThrowsMessage<UsageError>(HasSubstr("grid 'density' cannot become finer")));

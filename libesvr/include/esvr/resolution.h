@@ -56,6 +56,9 @@ inline constexpr double kFinestFactor = 1.0 / 64.0, kCoarsestFactor = 1024.0;
 /// no level sets, with a background near the values. \param factor  1 or above
 [[nodiscard]] SparseVolume coarsened(const SparseVolume& volume, int factor);
 
+/// The ellipsoids of a field among voxels whose edges are `factor` times as long. Below 1, there are more voxels.
+[[nodiscard]] Field amongOtherVoxels(Field field, double factor);
+
 /// Bytes of memory that decodeAtResolution() takes at most, but for level sets.
 struct ResolutionBytes {
   std::uint64_t result = 0, work = 0;  ///< of the volume, and besides it while it is made
