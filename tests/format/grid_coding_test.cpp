@@ -203,7 +203,8 @@ TEST(GridCoding, AQuantisedLevelSetHasItsBackgroundOnBothSidesOfItsBand) {
   for (std::size_t b = 0; b < source.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v)
       if (!source.active[b].test(v)) {
-        EXPECT_EQ(valueAt(decoded, source.brickCorner(b) + voxelLocal(v)), source.brickValues(b)[v]);
+        EXPECT_EQ(valueAt(decoded, source.brickCorner(b) + voxelLocal(v)),
+                  source.brickValues(b)[v]);
       }
 }
 
