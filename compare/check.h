@@ -67,9 +67,8 @@ struct CheckedGrid {
   std::vector<Difference> differences{};
   std::optional<std::int64_t> frame{};  ///< number of its frame, if the files are sequences
   double range = 0.0;  ///< to which limits in % refer: valueRangeOf() or valueRangeOfVectors()
-  /// The row has the lengths of vectors. Limits on errors hold for the components, as the bounds of
-  /// a conversion do; the error of a length is at most sqrt(3) times theirs.
-  bool isLengths = false;
+  /// The rows of vectors, for which limits of their own hold (LimitedRows, figures.h); nothing: numbers.
+  std::optional<LimitedRows> vectors{};
 };
 
 struct CheckRecord {

@@ -453,7 +453,7 @@ class Comparison {
                             .figures = figuresOf(metrics.magnitude),
                             .differences = compareDescriptors(a.descriptor, b.descriptor),
                             .range = range,
-                            .isLengths = true});
+                            .vectors = LimitedRows::kLengths});
     addDifferences(compareInactive(a.inactive, b.inactive), record.grids.back());
     addTemporal(record.grids.back(), {lengths, others, peak});
     for (std::size_t c = 0; c < kComponents; ++c) {
@@ -463,7 +463,8 @@ class Comparison {
                               .metrics = m,
                               .figures = figuresOf(m),
                               .differences = backgroundDifferences(a, b, c),
-                              .range = range});
+                              .range = range,
+                              .vectors = LimitedRows::kComponents});
       addRelativeError(record.grids.back(), a.components[c], b.components[c]);
       addTemporal(record.grids.back(), {a.components[c], b.components[c], peak});
     }

@@ -34,6 +34,10 @@ struct Slack {
   double relative = 0.0;  ///< share of the baseline's value
 };
 
+/// The rows of a grid of vectors for which a limit holds: those of the components, as for the goals of a conversion, or
+/// that of the lengths.
+enum class LimitedRows { kAll, kComponents, kLengths };
+
 struct Figure {
   FigureId id;
   const char* key;     ///< name in JSON: "psnr_box"
@@ -43,6 +47,7 @@ struct Figure {
   bool higherIsBetter;
   bool inValueUnits;  ///< whether a limit may be a share of the reference's range: "1%"
   Slack slack;
+  LimitedRows rows = LimitedRows::kAll;
 };
 
 [[nodiscard]] std::span<const Figure> allFigures();

@@ -15,12 +15,20 @@ namespace esvr::compare {
 
 // Limits.
 
+namespace {
+
+bool isLimited(const CheckedGrid& grid, const Figure& figure) {
+  return !grid.vectors || figure.rows == LimitedRows::kAll || figure.rows == *grid.vectors;
+}
+
+}  // namespace
+
 void judgeLimits(const CheckOptions& options, CheckRecord& record) {
   for (const CheckedGrid& grid : record.grids)
     for (const Figure& figure : allFigures()) {
       const auto& bound = options.limits[std::size_t(figure.id)];
       const auto value = valueOf(grid.figures, figure);
-      if (!bound || !value || (figure.inValueUnits && grid.isLengths)) continue;
+      if (!bound || !value || !isLimited(grid, figure)) continue;
       const double limit = bound->absolute(grid.range);
       if (figure.higherIsBetter ? *value < limit : *value > limit)
         record.failures.push_back("grid \"" + grid.name + "\": " + figure.header + " " +

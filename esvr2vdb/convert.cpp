@@ -12,6 +12,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -342,15 +343,24 @@ std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<ListedG
   return all;
 }
 
+/// The items that a NanoVDB file has no place for. It has one for the name and the class of a grid, and the name of the
+/// program that wrote a file before is no property of it.
+std::size_t lostItems(std::span<const MetaItem> items) {
+  constexpr std::array<std::string_view, 3> kNotLost{"name", "class", kWriterKey};
+  return std::size_t(std::ranges::count_if(items, [&](const MetaItem& item) {
+    return std::ranges::find(kNotLost, item.name) == kNotLost.end();
+  }));
+}
+
 /// Warns that a NanoVDB file cannot hold metadata.
 void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grids,
                       const Options& options, const cli::Log& log) {
   if (!writesNano(options)) return;
-  std::size_t items = file.metadata.size();
-  for (const auto& grid : grids) items += descriptorOf(grid).metadata.size();
+  std::size_t items = lostItems(file.metadata);
+  for (const auto& grid : grids) items += lostItems(descriptorOf(grid).metadata);
   if (items == 0) return;
   log.warning("a NanoVDB file holds no metadata, which is left out",
-              std::to_string(items) + " items");
+              std::to_string(items) + (items == 1 ? " item" : " items"));
 }
 
 /// Warns of carried grids with which older versions of OpenVDB open no grid of the file.

@@ -78,7 +78,7 @@ struct Options {
                                   const DecodeOptions& decode, const cli::Log& log);
 
 /// The factor of the voxels of a grid. `auto` must be resolved.
-/// \throws UsageError  as for factorFor
+/// \throws UsageError  as for factorFor and transformAt; the text names the grid
 [[nodiscard]] double factorOf(const Resolution& wish, const GridDescriptor& grid);
 
 /// For --coarsen. \throws UsageError  the text is no factor

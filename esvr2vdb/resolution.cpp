@@ -38,7 +38,8 @@ Resolution resolved(const Resolution& wish, std::span<const StoredGrid* const> g
   for (const int factor : kFactors) {
     const double bytes = bytesOf(grids, factor, decode);
     if (factor == kFactors.back())
-      requireWithinMemory(bytes, decode.maxBytes, "the grids, 8 times coarser,");
+      requireWithinMemory(bytes, decode.maxBytes,
+                          "decoding the grids with voxels 8 times as large");
     if (bytes > double(decode.maxBytes)) continue;
     if (factor > 1)
       log.info("--coarsen auto: voxels become " + std::to_string(factor) +
@@ -49,7 +50,13 @@ Resolution resolved(const Resolution& wish, std::span<const StoredGrid* const> g
 }
 
 double factorOf(const Resolution& wish, const GridDescriptor& grid) {
-  return wish.voxelSize ? factorFor(grid.transform, *wish.voxelSize) : wish.factor;
+  try {
+    const double factor = wish.voxelSize ? factorFor(grid.transform, *wish.voxelSize) : wish.factor;
+    (void)transformAt(grid.transform, factor);
+    return factor;
+  } catch (const UsageError& refusal) {  // which knows the transform only
+    throw UsageError("grid '" + shownName(grid.name) + "': " + refusal.what());
+  }
 }
 
 Resolution resolutionOf(const std::optional<std::string>& coarsen,

@@ -243,6 +243,7 @@ class Frames {
     const Image image = drawing.renderer->draw(r);
     show(image, r, files, watch.lap());
     if (!files.depth.empty()) writeDepth(depthOf(drawing, r), files.depth);
+    ++complete_;
   }
 
   /// Draws a frame in which nothing is active: it is transparent, and has no file of distances.
@@ -251,6 +252,7 @@ class Frames {
     Image image{r.resolution.width, r.resolution.height, {}};
     image.rgba.resize(std::size_t(image.width) * std::size_t(image.height) * kChannels);
     show(image, r, files, 0.0);
+    ++complete_;
   }
 
   /// Completes a video.
@@ -262,6 +264,14 @@ class Frames {
               cli::shortNumber(pictures_ / options_.fps) + " s of video");
   }
   [[nodiscard]] const nlohmann::ordered_json& comparisons() const { return comparisons_; }
+
+  /// What an interruption leaves: the pictures that are complete, or nothing of a video.
+  /// \throws RuntimeFailure  it leaves something
+  void tellInterruption(std::size_t all) const {
+    if (video_ || complete_ == 0) return;
+    throw RuntimeFailure("interrupted; " + std::to_string(complete_) + " of " +
+                         std::to_string(all) + " pictures are complete");
+  }
 
  private:
   void show(const Image& image, const RenderOptions& r, const PictureFiles& files, double seconds) {
@@ -335,7 +345,8 @@ class Frames {
   Drawing* reference_;
   const std::optional<report::ColorBar> bar_;
   std::optional<report::VideoFile> video_;
-  int pictures_ = 0;  ///< pictures of the video
+  int pictures_ = 0;          ///< pictures of the video
+  std::size_t complete_ = 0;  ///< pictures of which all files are there
   cli::Stopwatch watch_;
   nlohmann::ordered_json comparisons_ = nlohmann::ordered_json::array();
 };
@@ -473,11 +484,17 @@ void saveTransfer(const Options& options, const TransferFunction& transfer) {
 void drawFrames(const Options& options, RenderOptions r, Drawing& drawing, Frames& frames) {
   const Vec3 pivot = pivotOf(options, drawing.scenes);  // of a turntable
   const Camera first = r.camera;
-  for (const PictureFiles& files : pictureFiles(options)) {
-    if (files.frame > 0) r.camera = turned(first, 360.0 * files.frame / options.turntable, pivot);
-    frames.draw(drawing, r, files);
+  const std::vector<PictureFiles> pictures = pictureFiles(options);
+  try {
+    for (const PictureFiles& files : pictures) {
+      if (files.frame > 0) r.camera = turned(first, 360.0 * files.frame / options.turntable, pivot);
+      frames.draw(drawing, r, files);
+    }
+    frames.finish();
+  } catch (const Cancelled&) {
+    frames.tellInterruption(pictures.size());
+    throw;
   }
-  frames.finish();
 }
 
 void drawSequence(const Options& options, const DrawSettings& settings, const CancelToken& cancel) {
@@ -493,18 +510,21 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
   saveTransfer(options, r.transfer);
   Frames frames(options, all, nullptr, cancel);
   bool isReported = false;  // one warning for all frames
-  for (const cli::FrameNumber frame : *options.frames) {
+  const auto drawFrame = [&](cli::FrameNumber frame) {
     const PictureFiles files = filesOfFrame(options, frame);
     auto scenes = input.scenes(frame);
-    if (!scenes) {
-      frames.drawNothing(r, files);
-      continue;
-    }
+    if (!scenes) return frames.drawNothing(r, files);
     isReported = isReported || reportBetween(options, *scenes);
     Drawing drawing(std::move(*scenes), settings);
     frames.draw(drawing, r, files);
+  };
+  try {
+    for (const cli::FrameNumber frame : *options.frames) drawFrame(frame);
+    frames.finish();
+  } catch (const Cancelled&) {
+    frames.tellInterruption(options.frames->size());
+    throw;
   }
-  frames.finish();
 }
 
 /// Carries out the options. \throws Error

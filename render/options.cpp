@@ -365,8 +365,8 @@ void addPictureOptions(cli::po::options_description& options) {
     ("light", value<std::string>()->value_name("X,Y,Z"),
      "direction to the light of --shade, in index space")
     ("lod", value<std::string>()->value_name("L"),
-     "levels of detail. auto: where a pixel is wider than 6 voxels, draw means of 2^3, 4^3, ... voxels "
-     "at longer steps, which is faster, needs less memory and shows fewer stray pixels; off: draw "
+     "levels of detail. auto: where a pixel is wider than 6 voxels, draw voxels that are 2, 4, ... times "
+     "as large at longer steps, which is faster, needs less memory and shows fewer stray pixels; off: draw "
      "the voxels everywhere (default: auto; with --slice, off)")
     ("clip", value<std::string>()->value_name("BOX"),
      "draw only what lies in the box x0,y0,z0,x1,y1,z1")

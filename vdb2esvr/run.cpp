@@ -339,6 +339,7 @@ class FileConversion {
 };
 
 void tellResult(const Options& options, const RunRecord& record) {
+  const Completion completion;  // an interrupted run tells what it has written
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeReport(options, record));
   if (options.report != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)

@@ -651,6 +651,7 @@ SequenceRecord convertFramesOrReport(const Options& options, const CancelToken& 
 }
 
 void tellSequence(const Options& options, const SequenceRecord& record) {
+  const Completion completion;  // an interrupted run tells what it has written
   if (!options.report.empty())
     cli::writeJson({options.report, options.overwrite}, makeSequenceReport(options, record));
   if (options.report != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)

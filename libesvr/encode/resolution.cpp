@@ -34,7 +34,8 @@ void requireFactor(double factor) {
 
 const Matrix& affineOf(const Transform& transform) {
   if (!transform.affine)
-    throw UsageError("voxels of a frustum have no common size and keep their resolution");
+    throw UsageError(
+        "the voxels of a frustum have no common size and cannot become larger or smaller");
   return *transform.affine;
 }
 

@@ -223,6 +223,16 @@ bool isExact(const StoredGrid& grid) {
   return grid.voxels && grid.voxels->form != VoxelForm::kQuantised;
 }
 
+/// Gives the inactive voxels of a level set the background with their sign, as readers of VDB files do. Quantised
+/// voxels have them on their lattice, near it.
+void settleInactive(float background, SparseVolume& volume) {
+  parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
+    const auto values = volume.brickValues(b);
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v)) values[v] = std::copysign(background, values[v]);
+  });
+}
+
 /// The layer's voxels in some bricks.
 VoxelLayer partOf(const VoxelLayer& layer, std::span<const Coord> chosen) {
   VoxelLayer part;
@@ -258,6 +268,9 @@ SparseVolume decodedPart(const StoredGrid& grid, const DecodeOptions& options,
                                      : volumeOf(*grid.voxels);
   if (grid.voxels && grid.tone.isOn() && !isExact(grid)) applyTone(format::ruleOf(grid), volume);
   if (grid.voxels && options.box) clip(*options.box, format::ruleOf(grid), volume);
+  if (grid.voxels && !isExact(grid) && grid.descriptor.gridClass == GridClass::kLevelSet &&
+      !grid.farBackground)
+    settleInactive(volume.background, volume);
   if (grid.farBackground) setBackground(float(grid.descriptor.background), volume);
   if (grid.descriptor.valueType == ValueType::kHalf && !isExact(grid)) roundToHalfs(volume);
   format::restoreNonFinite(

@@ -157,8 +157,7 @@ double medianOf(const TileDepths& depths, double largest) {
 }
 
 /// TransmittanceReference::medianDepth without the rest.
-double medianDepthOf(const SparseVolume& volume) {
-  const Box box = activeBox(volume);
+double medianDepthOf(const SparseVolume& volume, const Box& box) {
   if (box.empty() || volume.background > 0.0f) return 0.0;
   const Projection made = project(volume, TileLayout(volume), box, {});
   return medianOf(made.depths, made.largest);
@@ -388,6 +387,7 @@ TransmittancePsnr TransmittanceReference::measureChange(const SparseVolume& chan
 
 TransmittancePsnr TransmittanceReference::measured(const SparseVolume& volume, Role role) const {
   if (!std::isfinite(volume.background)) throw BadInput("the background is not finite");
+  if (!isDefined()) throw UsageError("the box has no column of voxels that absorbs light");
   const Scale scale{box_, medianDepth_};
   DepthRule rule{.clamps = role == Role::kVolume};
   rule.empty = rule(volume.background);
@@ -427,8 +427,8 @@ std::optional<TransmittancePsnr> transmittancePsnr(const SparseVolume& reference
   return measure.isDefined() ? std::optional(measure.measure(candidate)) : std::nullopt;
 }
 
-std::optional<double> medianDepth(const SparseVolume& volume) {
-  const double median = metrics::medianDepthOf(volume);
+std::optional<double> medianDepth(const SparseVolume& volume, const std::optional<Box>& box) {
+  const double median = metrics::medianDepthOf(volume, box.value_or(activeBox(volume)));
   return median > 0.0 ? std::optional(median) : std::nullopt;
 }
 

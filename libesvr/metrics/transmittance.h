@@ -55,19 +55,20 @@ class TransmittanceReference {
   explicit TransmittanceReference(const SparseVolume& reference,
                                   const std::optional<Box>& box = {});
 
-  /// False if the reference has no column of positive depth or a background above 0. Nothing can be
-  /// measured then.
+  /// False if the reference has no column of positive depth in the box, or a background above 0. Nothing can be measured
+  /// then.
   [[nodiscard]] bool isDefined() const { return medianDepth_ > 0.0; }
   [[nodiscard]] double medianDepth() const { return medianDepth_; }
 
   /// Measures a volume. It takes less time if its bricks are those of the reference.
   /// \throws BadInput  a value is not finite
+  /// \throws UsageError  it is not isDefined()
   [[nodiscard]] TransmittancePsnr measure(const SparseVolume& candidate) const;
 
   /// Measures a change of the reference: the sum of both volumes, where the reference's values below
   /// 0 are 0 and the sum is not below 0 at any voxel. Only bricks with a change need to be there.
   /// The result differs from that of measure() by rounding.
-  /// \throws BadInput  a value is not finite
+  /// \throws BadInput, UsageError  as for measure()
   [[nodiscard]] TransmittancePsnr measureChange(const SparseVolume& change) const;
 
  private:

@@ -106,13 +106,20 @@ int run(int argc, char** argv) {
   const cli::ThreadLimit threads(arguments->threads);
   const cli::Interrupts interrupts;
   const cli::Log log(kName, arguments->verbosity);
-  for (std::size_t f = first; f <= last; ++f) {
-    const samples::SampleFile file = kind.make(
-        {.resolution = resolution,
-         .seed = std::uint64_t(seed),
-         .frame = int(f),
-         .limits = {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()}});
-    samples::writeOutput({paths[f], overwrite}, file.metadata, file.grids, log);
+  std::size_t f = first;
+  try {
+    for (; f <= last; ++f) {
+      const samples::SampleFile file = kind.make(
+          {.resolution = resolution,
+           .seed = std::uint64_t(seed),
+           .frame = int(f),
+           .limits = {.maxBricks = samples::bricksThatFit(), .cancel = &interrupts.token()}});
+      samples::writeOutput({paths[f], overwrite}, file.metadata, file.grids, log);
+    }
+  } catch (const Cancelled&) {
+    if (f == first) throw;
+    throw RuntimeFailure("interrupted; " + std::to_string(f - first) + " of " +
+                         std::to_string(last - first + 1) + " frames are complete");
   }
   return 0;
 }

@@ -102,10 +102,20 @@ TEST_F(CoarserGrid, isRefusedWhereOptionsContradictEachOther) {
        {std::pair{Words{"--coarsen", "3"}, "--coarsen must be 2, 4, 8 or auto"},
         {{"--coarsen", "2", "--voxel-size", "1"}, "exclude each other"},
         {{"--coarsen", "2", "--reference", in()}, "--reference compares voxels of one size"},
-        {{"--voxel-size", "1e9"}, "as large"}}) {
+        {{"--voxel-size", "1e9"}, "grid 'density': voxels can become"}}) {
     EXPECT_THAT(write(options), Fails(2, words));
   }
   EXPECT_THAT(esvr2vdb({"--list", out(), "--coarsen", "2"}), Fails(2));
+}
+
+TEST_F(CoarserGrid, isRefusedByItsNameWhereItIsAFrustum) {
+  std::filesystem::remove(in());
+  writeInput(in(), {{.voxels = softBall({})},
+                    {.name = "seen", .voxels = softBall({}), .map = InputMap::kFrustum}});
+  succeeded(quickFit(in(), out(), "--force"));
+  for (const Words& options : {Words{"--coarsen", "2"}, {"--voxel-size", "1"}})
+    EXPECT_THAT(write(options), Fails(2, "grid 'seen': the voxels of a frustum"));
+  succeeded(write({"--coarsen", "2", "-g", "density"}));
 }
 
 }  // namespace

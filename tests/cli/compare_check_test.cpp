@@ -1,6 +1,7 @@
 // Plan: `esvr-compare check` compares files of all formats, and sequences, with sources whose errors are
 // known. The temporal PSNR must see errors that change from frame to frame, and no others.
 
+#include <array>
 #include <cmath>
 
 #include "cli/compare_fixture.h"
@@ -46,6 +47,22 @@ class CompareCheck : public FolderTest {
 TEST_F(CompareCheck, refusesWhatTakesMoreMemoryThanAllowed) {
   write("drifted.vdb", {drifted()});
   EXPECT_THAT(check("drifted.vdb", "-g density --max-memory 100B"), Fails(5));
+}
+
+TEST_F(CompareCheck, limitsVectorsAsTheGoalsOfAConversionDo) {
+  const std::array<float, 3> same{1.0f, 1.0f, 1.0f};
+  const float amplitude = 1.0f / std::sqrt(3.0f), error = 0.01f * amplitude;
+  const std::vector<InputVoxel> voxels{{{0, 0, 0}, amplitude}, {{1, 0, 0}, -amplitude}};
+  std::vector<InputVoxel> shifted = voxels;  // lengths change by 0.01, the longest of which is 1
+  for (InputVoxel& voxel : shifted) voxel.value += error;
+  writeVectorInput(at("ref.vdb"), {.voxels = voxels, .scale = same});
+  writeVectorInput(at("shifted.vdb"), {.voxels = shifted, .scale = same});
+  // 40 dB of the lengths, and 44.77 dB of each component
+  succeeded(check("shifted.vdb", "--min-psnr 44.7 --min-psnr-active 44.7"));
+  EXPECT_THAT(check("shifted.vdb", "--min-psnr 44.8"),
+              Fails(4, "grid \"velocity.x\": PSNR box 44.77", Not(HasSubstr("\"velocity\""))));
+  // The sum of a component was 0, and one length is as much larger as the other one is smaller.
+  succeeded(check("shifted.vdb", "--max-mass-error 0.001"));
 }
 
 TEST_F(CompareCheck, printsATableOfAHundredColumns) {

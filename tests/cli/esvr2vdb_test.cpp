@@ -208,6 +208,24 @@ TEST_F(Esvr2Vdb, saysThatNanoVdbHoldsNoMetadata) {
   EXPECT_THAT(esvr2vdb({in(), out()}).err, Not(HasSubstr("metadata")));
 }
 
+TEST_F(Esvr2Vdb, doesNotCountWhatNanoVdbHoldsAsLostMetadata) {
+  const auto messagesOf = [&](const char* item) {
+    const auto grid = openvdb::FloatGrid::create();
+    grid->setName("density");
+    grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    grid->tree().setValue({1, 2, 3}, 1.0f);
+    if (item) grid->insertMeta(item, openvdb::Int32Metadata(1));
+    openvdb::io::File(at("plain.vdb")).write(openvdb::GridPtrVec{grid});
+    succeeded(quickFit(at("plain.vdb"), at("plain.esvr"), "-f"));
+    succeeded(
+        esvr2vdb({at("plain.esvr"), at("back.vdb"), "-f"}));  // which adds the name of its writer
+    succeeded(quickFit(at("back.vdb"), at("plain.esvr"), "-f"));
+    return succeeded(esvr2vdb({at("plain.esvr"), at("plain.nvdb"), "-f"})).err;
+  };
+  EXPECT_THAT(messagesOf(nullptr), IsEmpty());
+  EXPECT_THAT(messagesOf("shot"), HasSubstr("(1 item)"));
+}
+
 /// Writes an .esvr file whose only ellipsoid reaches thousands of voxels.
 void writeHugeScale(const std::string& path) {
   StoredGrid grid;

@@ -264,6 +264,14 @@ TEST_F(EsvrRenderTurn, AnInterruptedVideoLeavesNothing) {
   EXPECT_THAT(folder_.names(), ElementsAre("in.esvr", "in.vdb"));
 }
 
+TEST_F(EsvrRenderTurn, AnInterruptionSaysHowManyPicturesItLeaves) {
+  EXPECT_THAT(runInterrupted(ESVR_RENDER,
+                             {folder_ / "in.esvr", folder_ / "turn.png", "--turntable", "9999",
+                              "--resolution", "64x48"},
+                             "turn.0001.png"),
+              Fails(1, "interrupted; ", " of 9999 pictures are complete"));
+}
+
 TEST_F(EsvrRenderTurn, AVideoWithoutFfmpegIsRefused) {
   path_.hideOthers();
   EXPECT_THAT(draw("in.esvr", "turn.mp4", {"--turntable", "2"}), Fails(2, "install"));

@@ -187,13 +187,12 @@ TEST_F(Vdb2Esvr, keepsTheFileWhereOnlyTheTableCannotBePrinted) {
 /// A fit of a minute, which is interrupted after its first message about progress.
 class Interrupted : public Vdb2Esvr {
  protected:
-  [[nodiscard]] ProgramRun interrupted() const {
+  [[nodiscard]] ProgramRun interrupted(const Words& more = {}) const {
     writeInput(in(), {{.voxels = softBall({})},
                       {.name = "heat", .voxels = softBall({}, 2.0f)},
                       {.name = "copy", .voxels = softBall({})}});
-    return runInterrupted(VDB2ESVR,
-                          {in(), out(), "--seconds", "60", "--representation", "ellipsoids", "-v"},
-                          " left\n");
+    const Words fit{in(), out(), "--seconds", "60", "--representation", "ellipsoids", "-v"};
+    return runInterrupted(VDB2ESVR, joined(fit, more), " left\n");
   }
 };
 
@@ -202,6 +201,16 @@ TEST_F(Interrupted, writesTheBestSoFarAndEndsWithCodeOne) {
               Fails(1, "out.esvr has the best result so far, without grid \"heat\""));
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
   EXPECT_THAT(folder_.names(), ElementsAre("in.vdb", "out.esvr"));
+}
+
+TEST_F(Interrupted, reportsTheBestSoFar) {
+  const auto run = interrupted({"--report", at("r.json")});
+  EXPECT_THAT(run, Fails(1, "out.esvr has the best result so far"));
+  EXPECT_THAT(run.out, HasSubstr("density"));  // the summary
+  const auto report = Json::parse(readText(at("r.json")));
+  EXPECT_EQ(report["interrupted"], true);
+  EXPECT_EQ(report["exit_code"], 1);
+  EXPECT_EQ(report["output"]["bytes"], std::filesystem::file_size(out()));
 }
 
 TEST_F(Vdb2Esvr, SlowEndsWithinTwoSecondsOfASignal) {

@@ -194,6 +194,20 @@ TEST(GridCoding, ALevelSetGivesItsBandAndItsInsideBack) {
   EXPECT_EQ(valueAt(decoded, inside), -3.0f);
 }
 
+TEST(GridCoding, AQuantisedLevelSetHasItsBackgroundOnBothSidesOfItsBand) {
+  const SparseVolume source = revoxelise(ball(), {.threshold = 0.25f, .narrowBand = true});
+  ASSERT_EQ(valueAt(source, {20, 20, 20}), -3.0f);
+  const VoxelLayer layer = nearestLayer(source, 0.4, Activity::kExact);  // 3 is no multiple of 0.8
+  ASSERT_NE(valueAt(volumeOf(layer), {20, 20, 20}), -3.0f);
+  const SparseVolume decoded = decodeGrid(makeStoredVoxels(kLevelSet, source, layer));
+  for (std::size_t b = 0; b < source.brickCount(); ++b)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!source.active[b].test(v)) {
+        EXPECT_EQ(valueAt(decoded, source.brickCorner(b) + voxelLocal(v)),
+                  source.brickValues(b)[v]);
+      }
+}
+
 TEST(GridCoding, ALevelSetStaysWithinTheBricksOfItsSource) {
   const Field field = ball();
   const SparseVolume source = revoxelise(field, {.narrowBand = true});

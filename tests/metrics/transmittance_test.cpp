@@ -264,6 +264,17 @@ TEST(Transmittance, IsNothingWithoutDepth) {
   EXPECT_FALSE(medianDepth(SparseVolume{}));
 }
 
+TEST(Transmittance, IsNothingInABoxWithoutDepth) {
+  const SparseVolume some = volumeOf({{{0, 0, 0}, 1.0f}, {{1, 0, 0}, 0.0f}, {{64, 0, 0}, 0.0f}});
+  for (const Coord at : {Coord{1, 0, 0}, {9, 9, 9}, {64, 0, 0}, {1000, 0, 0}}) {
+    const Box box{at, at};
+    EXPECT_FALSE(medianDepth(some, box));
+    EXPECT_FALSE(transmittancePsnr(some, some, box));
+    EXPECT_THROW((void)metrics::TransmittanceReference(some, box).measure(some), UsageError);
+  }
+  EXPECT_EQ(medianDepth(some, Box{{0, 0, 0}, {1, 0, 0}}), 1.0);
+}
+
 TEST(Transmittance, IsForGridsThatAreLookedThrough) {
   const SparseVolume above = volumeOf({{{0, 0, 0}, 1.0f}}), below = volumeOf({{{0, 0, 0}, -1.0f}});
   EXPECT_TRUE(isLookedThrough(GridClass::kFogVolume, above));

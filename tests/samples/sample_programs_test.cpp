@@ -150,6 +150,15 @@ TEST(EsvrSample, leavesNothingWhenInterrupted) {
   EXPECT_THAT(folder.names(), IsEmpty());
 }
 
+TEST(EsvrSample, saysHowManyFramesAnInterruptionLeaves) {
+  const TemporaryFolder folder;
+  const auto run = test::runInterrupted(
+      ESVR_SAMPLE, {"plume", folder / "a.@.vdb", "--resolution", "16", "--frames", "99999"},
+      "a.2.vdb");
+  EXPECT_EQ(run.exitCode, 1);
+  EXPECT_THAT(run.err, HasSubstr(" of 99999 frames are complete"));
+}
+
 TEST(EsvrSample, saysSoWhenTheDiskIsFull) {
   const auto run = runProgram("/bin/sh", {"-c", std::string(ESVR_SAMPLE) + " --help > /dev/full"});
   EXPECT_EQ(run.exitCode, 1);

@@ -46,8 +46,10 @@ struct TransmittancePsnr {
     const std::optional<Box>& box = {});
 
 /// TransmittancePsnr::medianDepth of a volume.
+/// \param box  default: the active bounding box
 /// \return, \throws  as for transmittancePsnr
-[[nodiscard]] std::optional<double> medianDepth(const SparseVolume& volume);
+[[nodiscard]] std::optional<double> medianDepth(const SparseVolume& volume,
+                                                const std::optional<Box>& box = {});
 
 /// Estimates medianDepth() of the voxels of a field, for which some of its columns are evaluated, at
 /// most as many for each axis as lie in 2048 bricks. Voxels count whether they would be active or not.
