@@ -50,7 +50,7 @@ bool Judge::seesPictures(const ConvertInput& input, const ConvertOptions& option
   if (!mayBe && !std::holds_alternative<PictureGoal>(options.goal)) return false;
   return input.source.background == 0.0f &&
          isLookedThrough(input.descriptor.gridClass, input.source) &&
-         medianDepth(input.source).has_value();
+         medianDepth(input.source, options.fit.box).has_value();
 }
 
 Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve tone)

@@ -107,6 +107,17 @@ TEST(Tone, ReachesTheQualityOfPictures) {
   }
 }
 
+/// Where nothing is seen in the box, the values decide.
+TEST(Tone, OfABoxWithoutDepthIsNone) {
+  ConvertOptions options{.goal = PresetGoal{}};
+  for (const Box box : {Box{{0, 0, 0}, {1, 1, 1}}, Box{{100, 100, 100}, {105, 105, 105}}}) {
+    options.fit.box = box;
+    const Conversion made = shortlyFitted(smoke(), options);
+    EXPECT_FALSE(made.byPictures);
+    EXPECT_FALSE(made.grid.tone.isOn());
+  }
+}
+
 TEST(Tone, OfAFrameIsThatOfTheFrameBefore) {
   SparseVolume volume = smoke();
   ConvertOptions options{.goal = PictureGoal{33.0}, .representation = Representation::kEllipsoids};
