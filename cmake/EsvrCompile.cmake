@@ -34,18 +34,28 @@ if(NOT PROJECT_IS_TOP_LEVEL)
   return()
 endif()
 
-set(warnings -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
-if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
-  list(APPEND warnings -Wno-restrict) # GCC bug 105651: false warnings about std::string's operator+
+# Warnings are for those who change the code, in the presets that treat them as errors and under sanitizers. Without them,
+# a unit of tests compiles in five sixths of the time (test_core: 24.5 instead of 29.1 s).
+if(ESVR_WERROR OR ESVR_SANITIZE)
+  set(warnings -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+    list(APPEND warnings -Wno-restrict) # GCC bug 105651: false warnings about std::string's operator+
+  endif()
+  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
+  # CUDA code is compiled without -Wpedantic, which warns about line directives that nvcc generates.
+  list(REMOVE_ITEM warnings -Wpedantic)
+  list(JOIN warnings "," forHostCompiler)
+  add_compile_options("$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${forHostCompiler}>")
 endif()
-add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:${warnings}>")
-# CUDA code is compiled without -Wpedantic, which warns about line directives that nvcc generates.
-list(REMOVE_ITEM warnings -Wpedantic)
-list(JOIN warnings "," forHostCompiler)
-add_compile_options("$<$<COMPILE_LANGUAGE:CUDA>:-Xcompiler=${forHostCompiler}>")
 if(ESVR_WERROR)
   add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:-Werror>"
                       "$<$<COMPILE_LANGUAGE:CUDA>:-Werror=all-warnings;-Xcompiler=-Werror>")
+endif()
+
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  # GCC collects garbage when its memory has doubled, and here not below 1 GB, which most units never need. The
+  # collections of a unit of tests take 8 % of its time.
+  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:--param=ggc-min-heapsize=524288>")
 endif()
 
 if(ESVR_SANITIZE)

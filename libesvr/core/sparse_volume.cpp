@@ -15,6 +15,10 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 
+template class std::vector<float, esvr::VoxelAllocator<float>>;
+template class std::vector<std::int32_t, esvr::VoxelAllocator<std::int32_t>>;
+template class std::vector<std::byte, esvr::VoxelAllocator<std::byte>>;
+
 namespace esvr {
 
 // Making volumes.

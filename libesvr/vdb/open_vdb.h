@@ -15,8 +15,8 @@
 #error "ESVR needs OpenVDB 10 or newer"
 #endif
 
-// Every source file that uses these types would compile all virtual functions of their trees;
-// open_vdb.cpp compiles them once.
+// Every source file that uses these types would compile all virtual functions of their trees. libopenvdb or open_vdb.cpp
+// has them.
 extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
 extern template class openvdb::tree::Tree<openvdb::DoubleTree::RootNodeType>;
 extern template class openvdb::tree::Tree<openvdb::Vec3STree::RootNodeType>;

@@ -125,9 +125,17 @@ TEST_F(Parts, followNoLinkInTheirFolder) {
   }
 }
 
-constexpr std::int32_t kSide = 48;        // bricks; the voxels take 226 MB
-constexpr const char* kLimit = "190000";  // KB
-constexpr const char* kMaxMemory = "100MB";
+constexpr std::int32_t kSide = 32;  // bricks; the voxels take 67 MB
+constexpr const char* kMaxMemory = "25MB";
+
+/// A program, and KB between what it needs with voxels in files and what it would need with voxels on the heap.
+struct LimitedProgram {
+  std::string path;
+  std::string limit;
+};
+const LimitedProgram kFits{VDB2ESVR, "150000"};          // 130000, and more than 170000
+const LimitedProgram kConvertsBack{ESVR2VDB, "100000"};  // 75000
+const LimitedProgram kCompares{ESVR_COMPARE, "100000"};  // 75000, and more than 125000
 
 /// A dense volume with a smooth field, in which no brick is constant.
 VolumeGrid denseGrid() {
@@ -146,8 +154,8 @@ VolumeGrid denseGrid() {
   return grid;
 }
 
-ProgramRun limited(const std::string& program, const Words& arguments) {
-  std::string line = "ulimit -d " + std::string(kLimit) + "; exec " + program;
+ProgramRun limited(const LimitedProgram& program, const Words& arguments) {
+  std::string line = "ulimit -d " + program.limit + "; exec " + program.path;
   for (const auto& argument : arguments) line += " '" + argument + "'";
   return runShell(line);
 }
@@ -157,14 +165,21 @@ TEST(OutOfCore, SlowVolumeLargerThanTheMemoryGoesThereAndBack) {
   const std::string in = folder / "in.vdb", file = folder / "out.esvr", back = folder / "back.vdb";
   writeGrids(in, {}, std::vector{denseGrid()}, {.constantTiles = false});
   const Words memory{"--max-memory", kMaxMemory, "--scratch", folder.path().string()};
-  const auto run = [&](const std::string& program, const Words& arguments) {
+  const auto run = [&](const LimitedProgram& program, const Words& arguments) {
     const auto ended = limited(program, joined(arguments, memory));
-    EXPECT_EQ(ended.exitCode, 0) << program << ended.out << ended.err;
+    EXPECT_EQ(ended.exitCode, 0) << program.path << ended.out << ended.err;
   };
-  run(VDB2ESVR, {in, file, "--count", "300", "--iterations", "1", "--storage", "float32",
-                 "--device", "cpu", "--threads", "2", "-q"});
-  run(ESVR2VDB, {file, back, "--threads", "2"});
-  run(ESVR_COMPARE, {"check", in, back, "--min-psnr", "1", "--threads", "2"});
+  const auto needsFiles = [](const LimitedProgram& program, const Words& arguments) {
+    EXPECT_NE(limited(program, arguments).exitCode, 0) << program.path << ": the limit is too high";
+  };
+  const Words there =
+      joined({in, file}, "--count 10 --iterations 1 --storage float32 --device cpu --threads 2 -q");
+  const Words check{"check", in, back, "--min-psnr", "1", "--threads", "2"};
+  needsFiles(kFits, there);
+  run(kFits, there);
+  run(kConvertsBack, {file, back, "--threads", "2"});
+  needsFiles(kCompares, check);
+  run(kCompares, check);
 }
 
 /// Enough for a small volume without its voxels.

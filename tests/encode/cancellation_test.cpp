@@ -84,8 +84,8 @@ std::optional<Conversion> converted(const Wanted& wanted, const SparseVolume& vo
   options.goal = wanted.goal;
   options.representation = wanted.representation;
   options.fit.cancel = &token;
-  options.fit.iterations = 40;
-  options.fit.count = 150;
+  options.fit.iterations = 20;
+  options.fit.count = 80;
   return convertVolume({descriptor, volume}, options);
 } catch (const Cancelled&) {
   return std::nullopt;

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 FRAMES = 3
-PLUME = "40"  # voxels along the longest side of a sample
+PLUME = "24"  # voxels along the longest side of a sample
 IMAGE_SIDE = 64  # the number that an example of esvr-compare table names
 
 # A compressor of float arrays for esvr-compare: multiples of the bound, deflated.

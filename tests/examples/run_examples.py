@@ -41,8 +41,10 @@ def quickened(words):
         quick.update({"--resolution": "48", "--frames": str(FRAMES)})
     else:
         quick["--frames"] = f"1-{FRAMES}"
-    picture = ["--resolution", "64x64"] if words[0] == "esvr-render" else []
-    return [quick.get(before, word) for before, word in zip([""] + words, words)] + picture
+    added = ["--resolution", "64x64"] if words[0] == "esvr-render" else []
+    if "--bench" in words:
+        added += ["--turntable", quick["--turntable"]]
+    return [quick.get(before, word) for before, word in zip([""] + words, words)] + added
 
 
 def output_of(words):

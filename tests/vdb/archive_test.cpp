@@ -83,7 +83,7 @@ openvdb::GridPtrVec gridsOfAllKinds() {
   for (int i = 0; i < 3000; ++i)
     density->tree().setValue({i % 20, i / 20, (i * i) % 41}, float(i % 13) / 4.0f);
   density->tree().addTile(1, {64, 0, 0}, 0.5f, true);
-  auto half = density->deepCopy();
+  auto half = openvdb::gridPtrCast<openvdb::FloatGrid>(density->deepCopyGrid());
   half->setName("half");
   half->setSaveFloatAsHalf(true);
   auto instance = openvdb::FloatGrid::create(density->treePtr());

@@ -183,7 +183,8 @@ TEST_F(Voxels, InactiveValuesAreTheSameWhateverTheTiles) {
 TEST_F(Voxels, TheInsideOfALevelSetIsLostOnlyIfAWriterDoesNotRestoreIt) {
   auto sphere = openvdb::tools::createLevelSetSphere<FloatGrid>(12.0f, {0, 0, 0}, 1.0f);
   EXPECT_EQ(saveAndRead(sphere).inactive.count(), 0u);
-  auto island = sphere->deepCopy();  // nothing around it says that it is inside
+  // Nothing around it says that it is inside.
+  auto island = openvdb::gridPtrCast<FloatGrid>(sphere->deepCopyGrid());
   island->tree().addTile(2, {1280, 0, 0}, -sphere->background(), false);
   EXPECT_EQ(saveAndRead(island).inactive.count(), 128u * 128u * 128u);
   for (auto value = sphere->beginValueOff(); value; ++value)

@@ -386,3 +386,9 @@ class EmptySigns {
 };
 
 }  // namespace esvr
+
+// libesvr has the functions of these arrays, compiled with optimisation. Those of a program without optimisation would
+// visit each voxel where an array ends, since only std::allocator says that there is nothing to do.
+extern template class std::vector<float, esvr::VoxelAllocator<float>>;
+extern template class std::vector<std::int32_t, esvr::VoxelAllocator<std::int32_t>>;
+extern template class std::vector<std::byte, esvr::VoxelAllocator<std::byte>>;

@@ -80,7 +80,8 @@ async function newTab(t, shared, options) {
  */
 export async function openPage(t, shared, { hash = "", url = shared.server?.url, expectErrors, ...options } = {}) {
   const viewport = shared.viewport ?? { width: 900, height: 600 };
-  const all = { viewport, permissions: ["clipboard-read", "clipboard-write"], ...options };
+  // Half a pixel for each of CSS: pictures have a quarter of the pixels, and nothing else is smaller.
+  const all = { viewport, deviceScaleFactor: 0.5, permissions: ["clipboard-read", "clipboard-write"], ...options };
   const shares = Object.keys(options).length === 0 && !shared.taken;
   const page = shares ? (shared.tab ??= await newTab(null, shared, all)) : await newTab(t, shared, all);
   if (shares) {
