@@ -159,7 +159,7 @@ struct ConvertOptions {
   /// are then those of a frame (bytesInFrame), and voxels are chosen so that they take few of them.
   /// Another grid that this one refers to in its file may take its place.
   /// For a goal that is a quality, a frame has the representation and the tone curve of the frame before: voxels
-  /// are predicted from its voxels, and a fit continues its ellipsoids, in about two thirds of the time of a search. Where that
+  /// are predicted from its voxels, and a fit continues its ellipsoids, which takes less time than a search. Where that
   /// takes many more bytes, or misses the goal, the frame is converted as if it stood alone.
   const StoredGrid* previous = nullptr;
   /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
