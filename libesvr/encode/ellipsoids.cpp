@@ -227,9 +227,10 @@ constexpr double kMostOfScout = 1000.0, kMostOfLargeScout = 2000.0, kBricksOfSco
 constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
 /// The number of ellipsoids with which a frame begins, relative to that of the frame before (Lab, "Frames that continue").
 constexpr double kFewerInFrame = 0.95;
-/// Active voxels for each ellipsoid from which on fits to averages are tried, the largest number of iterations of a whole
-/// one, and the largest share of the squared error that averaging may have (Lab, "Fits to averages").
-constexpr double kVoxelsOfAverages = 800.0, kMostOfAveraging = 0.5;
+/// Active voxels for each ellipsoid and number of ellipsoids from which on fits to averages are tried, the largest number of
+/// iterations of a whole one, and the largest share of the squared error that averaging may have (Lab, "Fits to averages").
+/// Fits of fewer ellipsoids take little time, and one more or less decides.
+constexpr double kVoxelsOfAverages = 800.0, kFewestOfAverages = 200.0, kMostOfAveraging = 0.5;
 constexpr std::uint32_t kMostIterationsOfAverages = 1000;
 /// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
 /// size is given up, and the share of a size that may stay unused: a hundredth.
@@ -534,7 +535,7 @@ bool EllipsoidSearch::mayFitAverages(double count) const {
   const FitOptions& fit = options_.fit;
   const double voxels = double(activeVoxelCount(job_.input.source));
   return !fit.box && !options_.filled && !fit.narrowBand && !saturates_ &&
-         voxels >= kVoxelsOfAverages * count;
+         count >= kFewestOfAverages && voxels >= kVoxelsOfAverages * count;
 }
 
 /// The share of the squared error of a fit to averages that is due to the averaging: its error over the averages is less
@@ -561,7 +562,7 @@ void EllipsoidSearch::fitAverages() {
   plan_.wholeIterations = std::min(plan_.wholeIterations, kMostIterationsOfAverages);
 }
 
-/// Makes all further fits to the voxels themselves.
+/// Makes all further fits to the voxels themselves, with no more iterations than were planned for few bytes.
 void EllipsoidSearch::fitVoxels() {
   job_.averages = nullptr, averages_ = {};
   const Plan plan = planOf(job_);
@@ -577,6 +578,7 @@ void EllipsoidSearch::draftFirst() {
   if (!averagesSuffice()) {
     job_.scout = pointOf(*draft_);
     fitVoxels();
+    plan_ = planOf(job_);
     draft_ = shortFit(capped(firstCountForPsnr()));
   }
   drafted_ = {pointOf(*draft_)};
@@ -632,6 +634,7 @@ void EllipsoidSearch::continueFrame() {
   draft_ = continued(before, count, share);
   if (!averagesSuffice()) {
     fitVoxels();
+    plan_ = planOf(job_);
     draft_ = continued(before, count, share);
   }
   drafted_ = {pointOf(*draft_)};

@@ -55,8 +55,9 @@ struct Margin {
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
 /// Plan::wholeFits whole fits are made (up to four short ones if few ellipsoids suffice; for a size up to five, if
-/// the ellipsoids of none before keep to it), and at most five short ones: four to find the number of ellipsoids, and one to decide about their
-/// signs. A frame of a sequence continues the ellipsoids of the frame before instead of making short fits.
+/// the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
+/// decide about their signs, and one that shows that averages do not suffice. A frame of a sequence continues the ellipsoids
+/// of the frame before instead of making short fits.
 class EllipsoidSearch {
  public:
   struct Goal {
