@@ -54,7 +54,8 @@ double factorOf(const Resolution& wish, const GridDescriptor& grid) {
     const double factor = wish.voxelSize ? factorFor(grid.transform, *wish.voxelSize) : wish.factor;
     (void)transformAt(grid.transform, factor);
     return factor;
-  } catch (const UsageError& refusal) {  // which knows the transform only
+  } catch (const UsageError& refusal) {
+    // The refusal knows the transform, and not the name of the grid.
     throw UsageError("grid '" + shownName(grid.name) + "': " + refusal.what());
   }
 }

@@ -217,8 +217,7 @@ TEST_F(Esvr2Vdb, doesNotCountWhatNanoVdbHoldsAsLostMetadata) {
     if (item) grid->insertMeta(item, openvdb::Int32Metadata(1));
     openvdb::io::File(at("plain.vdb")).write(openvdb::GridPtrVec{grid});
     succeeded(quickFit(at("plain.vdb"), at("plain.esvr"), "-f"));
-    succeeded(
-        esvr2vdb({at("plain.esvr"), at("back.vdb"), "-f"}));  // which adds the name of its writer
+    succeeded(esvr2vdb({at("plain.esvr"), at("back.vdb"), "-f"}));  // esvr2vdb adds its own name
     succeeded(quickFit(at("back.vdb"), at("plain.esvr"), "-f"));
     return succeeded(esvr2vdb({at("plain.esvr"), at("plain.nvdb"), "-f"})).err;
   };

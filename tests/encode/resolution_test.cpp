@@ -248,13 +248,18 @@ TEST(Resolution, OfAFrustumAndFactorsOutOfRangeAreRefused) {
     EXPECT_THROW((void)transformAt(descriptorOf().transform, factor), UsageError);
 }
 
-TEST(Finer, EllipsoidsAreEvaluatedBetweenVoxels) {
+/// Twenty ellipsoids that are fitted to soft().
+StoredGrid softEllipsoids() {
   ConvertOptions options;
   options.goal = FitGoal{};
   options.representation = Representation::kEllipsoids;
   options.fit.count = 20;
   options.fit.iterations = 40;
-  const StoredGrid grid = convertVolume({descriptorOf(), soft()}, options).grid;
+  return convertVolume({descriptorOf(), soft()}, options).grid;
+}
+
+TEST(Finer, EllipsoidsAreEvaluatedBetweenVoxels) {
+  const StoredGrid grid = softEllipsoids();
   for (const double r : {0.5, 0.4}) {
     const VolumeGrid finer = decodeAtResolution(grid, r);
     std::vector<Place> places;
@@ -279,12 +284,7 @@ TEST(Finer, EllipsoidsAreEvaluatedBetweenVoxels) {
 }
 
 TEST(Field, AmongOtherVoxelsHasItsValuesAtTheSamePlaces) {
-  ConvertOptions options;
-  options.goal = FitGoal{};
-  options.representation = Representation::kEllipsoids;
-  options.fit.count = 20;
-  options.fit.iterations = 40;
-  const Field field = convertVolume({descriptorOf(), soft()}, options).grid.field;
+  const Field field = softEllipsoids().field;
   std::vector<Place> places;
   for (int n = 0; n < 200; ++n) places.push_back({0.17 * n, 24.0 - 0.11 * n, 5.0 + 0.07 * n});
   std::vector<float> expected(places.size()), values(places.size());

@@ -5,7 +5,7 @@
 ///
 /// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
 /// (three for Preset::kHigh and above the usual effort; four of at most half the length where ellipsoids take
-/// less than 2 KB; for a size up to five, until one keeps to it), and at most five short ones, which forecast
+/// less than 2 KB; for a size up to five, until one keeps to it), and at most six short ones, which forecast
 /// them, besides two that choose a tone curve.
 
 #include <compare>
