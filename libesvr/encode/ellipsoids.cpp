@@ -126,9 +126,10 @@ void reserveLayerErrors(const Job& job, StoredGrid& grid) {
 /// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
 /// cancelled meanwhile. Rate control passes over the whole volume on the device of the fit, or on the
 /// CPU if the fit was divided into chunks, because the volume may not fit into the GPU's memory.
-/// \param steps  those of the result; null: they are searched for the target
-CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
-                          CompactOptions target, const QuantiserSteps* steps = nullptr) {
+/// \param round  makes the result for the options that the job completes
+template <class Round>
+CompactResult roundedBy(const Job& job, const StoredGrid& grid, const FitResult& fit,
+                        CompactOptions target, const Round& round) {
   const FitOptions& wanted = job.options.fit;
   if (job.judge) target.layerErrors = false;
   target.box = wanted.box;
@@ -136,8 +137,7 @@ CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResul
   target.device = fit.chunks > 1 ? Device{} : wanted.device;
   auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
     if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return steps ? compactAt(*steps, grid, job.input.source, target)
-                 : compactGrid(grid, job.input.source, target);
+    return round(target);
   });
   if (!found) {
     const BestSoFar completion;
@@ -146,6 +146,13 @@ CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResul
   }
   reserveLayerErrors(job, found->grid);
   return std::move(*found);
+}
+
+CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
+                          const CompactOptions& target) {
+  return roundedBy(job, grid, fit, target, [&](const CompactOptions& options) {
+    return compactGrid(grid, job.input.source, options);
+  });
 }
 
 Conversion conversionOf(FitResult fit, CompactResult compact) {
@@ -431,7 +438,15 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
     return storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
   const double loss =
       std::clamp((attempt.psnr - *goal_.psnr) / rounding_.factor, kLeastLoss, kMostRoundingLoss);
-  CompactResult made = compacted(attempt, {.loss = loss});
+  std::optional<Compactor> compactor;
+  const auto rounded = [&](const QuantiserSteps* steps) {
+    return roundedBy(job_, attempt.grid, attempt.fit, {.loss = loss},
+                     [&](const CompactOptions& options) {
+                       if (!compactor) compactor.emplace(attempt.grid, job_.input.source, options);
+                       return steps ? compactor->at(*steps) : compactor->nearGoal();
+                     });
+  };
+  CompactResult made = rounded(nullptr);
   const QuantiserSteps steps = made.steps;
   // The loss, dB, falls by a factor of 4 for an octave.
   RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, *goal_.psnr + 0.5 * kPsnrSpare,
@@ -446,7 +461,7 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
     search.learn(psnr);
     if (trial == kMostRoundings || search.ended()) break;
     const QuantiserSteps next = finer(steps, search.next());
-    made = compactedTo(job_, attempt.grid, attempt.fit, {}, &next);
+    made = rounded(&next);
   }
   if (*reached_ < *goal_.psnr && !attempt.cancelled()) attempt.fit.end = FitEnd::kPsnrMissed;
   return conversionOf(std::move(attempt.fit), std::move(*best));

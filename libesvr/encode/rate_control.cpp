@@ -126,9 +126,7 @@ RateTrials::RateTrials(const StoredGrid& grid, const RateTarget& target)
 void RateTrials::solveField() {
   auto intensities = intensitiesOf(field_);
   error_ = errorOf(field_, intensities).squares;
-  problem_.setShapes(field_);
-  (void)problem_.solve(intensities, kFirstIterations);
-  leastError_ = errorOf(field_, intensities).squares;
+  leastError_ = problem_.solve(intensities, kFirstIterations);
   setIntensities(intensities, field_);
 }
 
@@ -371,10 +369,15 @@ RateTrial balanced(RateTrials& trials, const RateTrial& here) {
           std::uint64_t(std::max(double(here.bytes) - saved, 0.0))};
 }
 
+/// Octaves by which steps must be finer to reach the aim.
+double octavesTo(const StepGoal& goal, const RateTrial& trial) {
+  return (goal.aim() - goal.figure(trial)) / goal.slope();
+}
+
 /// The best steps for a goal. If no trial meets it, the result is the one that misses it by the least.
 RateTrial chooseSteps(RateTrials& trials, const StepGoal& goal, const QuantiserSteps& guess) {
   const RateTrial expected = balanced(trials, approach(trials, goal, guess));
-  return scaleTo(trials, goal, expected.steps, (goal.aim() - goal.figure(expected)) / goal.slope());
+  return scaleTo(trials, goal, expected.steps, octavesTo(goal, expected));
 }
 
 StepGoal errorGoal(const RateTrials& trials, double allowed) {
@@ -425,6 +428,16 @@ RateTrial chosen(RateTrials& trials, const CompactOptions& options) {
   return chooseSteps(trials, errorGoal(trials, allowed), guess);
 }
 
+/// Balanced steps whose error should be the allowed one, without the trials that find it exactly.
+RateTrial nearlyChosen(RateTrials& trials, const CompactOptions& options) {
+  const double allowed = allowedError(trials, options);
+  const QuantiserSteps guess = stepsWithin(trials, allowed);
+  if (trials.leastError() >= allowed) return trials.make(scaled(guess, kFinestFactor));
+  const StepGoal goal = errorGoal(trials, allowed);
+  const RateTrial expected = balanced(trials, approach(trials, goal, guess));
+  return trials.make(finer(expected.steps, octavesTo(goal, expected)));
+}
+
 /// What the PSNR of a result exceeds the wanted one by, dB.
 double excessOf(const StoredGrid& grid, const SparseVolume& source, const CompactOptions& options) {
   return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}),
@@ -454,34 +467,10 @@ std::vector<LayerError> decodedLayerErrors(const StoredGrid& grid, const SparseV
   return errors;
 }
 
-/// \param steps  those of the result; null: they are searched
 CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
-                          const CompactOptions& options, const QuantiserSteps* steps = nullptr) {
-  CompactResult result{grid, {}, 0.0, 0};
-  if (grid.field.ellipsoidCount() == 0) return result;
-  const Box box = options.box.value_or(activeBox(source));
-  RateTrials trials(grid, {.source = source,
-                           .box = box,
-                           .device = options.device,
-                           .peak = options.peak,
-                           .quick = options.quick});
-  RateTrial best = steps ? trials.make(*steps) : chosen(trials, options);
-  if (options.quick) best.error = trials.measure(best);
-  // The trials know no mask, and no voxels outside the active box that become the background.
-  const bool sameRule = grid.topology != TopologyKind::kMask && common(box, grid.activeBox) == box;
-  result.grid.layerErrors.clear();
-  if (options.layerErrors && !options.quick && sameRule)
-    result.grid.layerErrors = trials.layerErrors(best);
-  result.grid.field = std::move(best.field);
-  result.grid.quantised = std::move(best.quantised);
-  result.steps = best.steps;
-  result.bytes = best.bytes;
-  result.loss = trials.error() > 0.0 ? 10.0 * std::log10(best.error / trials.error()) : 0.0;
-  if (options.quick) return result;
-  if (options.layerErrors && !sameRule)
-    result.grid.layerErrors =
-        decodedLayerErrors(result.grid, source, {.box = box, .peak = options.peak});
-  if (missedByReader(result.grid, source, options)) {
+                          const CompactOptions& options) {
+  CompactResult result = Compactor(grid, source, options).toGoal();
+  if (!options.quick && missedByReader(result.grid, source, options)) {
     CompactOptions again = options;
     again.device = {};
     return compactOnce(grid, source, again);
@@ -511,9 +500,52 @@ QuantiserSteps finer(QuantiserSteps steps, double octaves) {
   return scaled(steps, std::exp2(-octaves));
 }
 
-CompactResult compactAt(const QuantiserSteps& steps, const StoredGrid& grid,
-                        const SparseVolume& source, const CompactOptions& options) {
-  return compactOnce(grid, source, options, &steps);
+Compactor::Compactor(const StoredGrid& grid, const SparseVolume& source,
+                     const CompactOptions& options)
+    : grid_(grid),
+      source_(source),
+      options_(options),
+      box_(options.box.value_or(activeBox(source))) {
+  if (grid.field.ellipsoidCount() == 0) return;
+  trials_.emplace(grid, RateTarget{.source = source,
+                                   .box = box_,
+                                   .device = options.device,
+                                   .peak = options.peak,
+                                   .quick = options.quick});
+}
+
+CompactResult Compactor::toGoal() {
+  if (!trials_) return {grid_, {}, 0.0, 0};
+  return resultOf(chosen(*trials_, options_));
+}
+
+CompactResult Compactor::nearGoal() {
+  if (!trials_) return {grid_, {}, 0.0, 0};
+  return resultOf(nearlyChosen(*trials_, options_));
+}
+
+CompactResult Compactor::at(const QuantiserSteps& steps) {
+  if (!trials_) return {grid_, {}, 0.0, 0};
+  return resultOf(trials_->make(steps));
+}
+
+CompactResult Compactor::resultOf(RateTrial trial) {
+  CompactResult result{grid_, trial.steps, 0.0, trial.bytes};
+  if (options_.quick) trial.error = trials_->measure(trial);
+  const double before = trials_->error();
+  result.loss = before > 0.0 ? 10.0 * std::log10(trial.error / before) : 0.0;
+  // The trials know no mask, and no voxels outside the active box that become the background.
+  const bool sameRule =
+      grid_.topology != TopologyKind::kMask && common(box_, grid_.activeBox) == box_;
+  const bool hasErrors = options_.layerErrors && !options_.quick;
+  result.grid.layerErrors.clear();
+  if (hasErrors && sameRule) result.grid.layerErrors = trials_->layerErrors(trial);
+  result.grid.field = std::move(trial.field);
+  result.grid.quantised = std::move(trial.quantised);
+  if (hasErrors && !sameRule)
+    result.grid.layerErrors =
+        decodedLayerErrors(result.grid, source_, {.box = box_, .peak = options_.peak});
+  return result;
 }
 
 }  // namespace esvr::encode

@@ -1,6 +1,7 @@
 #pragma once
 /// Rate control of ellipsoids: the steps of the four parameter streams with which a fitted grid takes the fewest bytes for
-/// an error, or has the smallest error for its bytes. compactGrid() (esvr/encode.h) is what the rest of the encoder calls.
+/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid() (esvr/encode.h), or Compactor
+/// where it judges several results.
 
 #include <cstddef>
 #include <cstdint>
@@ -95,8 +96,26 @@ class RateTrials {
 /// Steps that are finer by a number of octaves.
 [[nodiscard]] QuantiserSteps finer(QuantiserSteps steps, double octaves);
 
-/// Compacts a grid like compactGrid(), with given steps in place of a search for them.
-[[nodiscard]] CompactResult compactAt(const QuantiserSteps& steps, const StoredGrid& grid,
-                                      const SparseVolume& source, const CompactOptions& options);
+/// Rounds one grid several times, where a caller judges what it got. compactGrid() rounds once.
+class Compactor {
+ public:
+  /// The grid and the source must outlive the object. \throws DeviceError  the GPU cannot be used
+  Compactor(const StoredGrid& grid, const SparseVolume& source, const CompactOptions& options);
+
+  /// The best result within the goal of the options.
+  [[nodiscard]] CompactResult toGoal();
+  /// A result with balanced steps whose PSNR is about that of the goal, after few trials.
+  [[nodiscard]] CompactResult nearGoal();
+  [[nodiscard]] CompactResult at(const QuantiserSteps& steps);
+
+ private:
+  [[nodiscard]] CompactResult resultOf(RateTrial trial);
+
+  const StoredGrid& grid_;
+  const SparseVolume& source_;
+  CompactOptions options_;
+  Box box_;
+  std::optional<RateTrials> trials_;  ///< nothing if the grid has no ellipsoids
+};
 
 }  // namespace esvr::encode
