@@ -13,6 +13,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <random>
 #include <set>
 
 #include "encode/volumes.h"
@@ -198,6 +199,23 @@ TEST(ConvertGridsToSize, RefusesWhatLeavesNothingForTheGrids) {
     FAIL();
   } catch (const UsageError& error) {
     EXPECT_THAT(error.what(), HasSubstr("without any fitted grid; the size allows 40"));
+  }
+}
+
+/// A grid with a long name needs more than the few bytes that every grid gets at first, whether it is converted
+/// before or after the one that has bytes to spare.
+TEST(ConvertGridsToSize, IsRefusedOnlyIfNothingFits) {
+  const SparseVolume cloud = test::smoothVolume(), ball = softBall({}, 1.0f, 3.0);
+  std::string name(900, ' ');
+  std::mt19937 random(1);  // so that it does not become smaller
+  for (char& letter : name) letter = char('!' + random() % 90);
+  for (const FileSource& file :
+       {fileOf({{"large", cloud}, {name, ball}}), fileOf({{name, ball}, {"large", cloud}})}) {
+    constexpr std::uint64_t kSize = 3000, kTooSmall = 1100;
+    const std::uint64_t bytes = encodeEsvr(convertGrids(file, sizedOptions(kSize)).file).size();
+    EXPECT_LE(bytes, kSize);
+    EXPECT_GE(double(bytes), 0.9 * double(kSize));
+    EXPECT_THROW((void)convertGrids(file, sizedOptions(kTooSmall)), UsageError);
   }
 }
 
