@@ -494,8 +494,8 @@ class GridsConversion {
         convert(g, shares);
       } catch (const SizeTooSmall& error) {
         if (source_.grids.size() == 1) throw;
-        // How many bytes voxels need is not known.
-        needed_[g] = share + (error.missing > 0 ? error.missing : share / 8 + 1);
+        // With other bytes another fit may need a few more. These steps end such a search soon.
+        needed_[g] = share + std::max(error.missing, share / 8 + 8);
         return false;
       }
     }
