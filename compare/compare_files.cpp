@@ -297,8 +297,8 @@ void compareEmpty(const CheckOptions& options, const GridPair& pair, CheckRecord
   const VolumeGrid a = pair.reference.read(pair.ofReference);
   const VolumeGrid b = pair.candidate.read(pair.ofCandidate);
   if (const auto voxels = activeVoxelCount(b.volume); voxels > 0)
-    record.failures.push_back(lineOf(pair) + "the candidate has " + std::to_string(voxels) +
-                              " active voxels, the reference has none");
+    record.failures.push_back(lineOf(pair) + "the candidate has " +
+                              cli::counted(voxels, "active voxel") + ", the reference has none");
   else
     record.same.push_back(lineOf(pair) + "no active voxel in either file");
   auto differences = compareDescriptors(a.descriptor, b.descriptor);

@@ -102,7 +102,7 @@ std::string sentenceOf(const std::vector<Duel>& duels) {
   const bool all = wins == duels.size();
   const std::string count = wins == 0 ? "none" : std::to_string(wins);
   return "ESVR has a higher PSNR than the best rival for " + (all ? "all" : count + " of") + " " +
-         std::to_string(duels.size()) + " files, from " + bytesText(bytesOf(*duels.front().ours)) +
+         cli::counted(duels.size(), "file") + ", from " + bytesText(bytesOf(*duels.front().ours)) +
          " to " + bytesText(bytesOf(*duels.back().ours)) + rangeOf(duels, !all) + ".";
 }
 

@@ -25,9 +25,9 @@ using report::Series;
 // Sentences.
 
 std::string sceneLine(const TableRecord& record) {
-  return "grid \"" + record.grid + "\", " + std::to_string(record.activeVoxels) +
-         " active voxels, box " + toString(record.box.min) + " to " + toString(record.box.max) +
-         ", peak " + cli::shortNumber(record.peak);
+  return "grid \"" + record.grid + "\", " + cli::counted(record.activeVoxels, "active voxel") +
+         ", box " + toString(record.box.min) + " to " + toString(record.box.max) + ", peak " +
+         cli::shortNumber(record.peak);
 }
 
 std::string pictureLine(const TableRecord& record) {

@@ -508,8 +508,8 @@ void addRow(const TableScene& scene, const cli::Log& log, TableRow row, TableRec
 
 void requireAllRows(const TableRecord& record) {
   if (record.interrupted)
-    throw RuntimeFailure("interrupted; " + std::to_string(record.rows.size()) +
-                         " rows were made, the others are missing");
+    throw RuntimeFailure("interrupted; " + cli::counted(record.rows.size(), "row") +
+                         " made, the others are missing");
 }
 
 }  // namespace esvr::compare

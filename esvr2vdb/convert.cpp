@@ -311,15 +311,19 @@ std::vector<const StoredGrid*> storedGrids(const EsvrFile& file,
   return grids;
 }
 
-/// The grids that are not carried, in order.
-std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
-                                   const Options& given, const cli::Log& log) {
-  Options options = given;
-  std::vector<DecodedGrid> grids;
+/// How grids are decoded beside the content of the file.
+DecodeOptions decodingOf(const EsvrFile& file, const Options& options) {
   DecodeOptions decode = options.decode;
   decode.maxBytes = options.memory.maxBytes - std::min(options.memory.maxBytes, contentBytes(file));
   decode.memory = options.memory.voxels;
-  options.resolution = resolved(options.resolution, storedGrids(file, chosen), decode, log);
+  return decode;
+}
+
+/// The grids that are not carried, in order.
+std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
+                                   const Options& options, const cli::Log& log) {
+  std::vector<DecodedGrid> grids;
+  DecodeOptions decode = decodingOf(file, options);
   for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
     grids.push_back(decoded(file, named.grid, options, decode));
@@ -371,6 +375,27 @@ void tellHalfGrids(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
     if (grid.isCarried && file.carried[grid.index].treeType.starts_with("Tree_half_"))
       log.warning("grid \"" + shownName(name) +
                   "\" is a HalfGrid; only OpenVDB 13 and newer open a file with one");
+}
+
+void tellNotCompared(const std::vector<ListedGrid>& chosen, const cli::Log& log) {
+  for (const auto& [grid, name, place] : chosen)
+    if (grid.isCarried)
+      log.warning("grid \"" + shownName(name) +
+                  "\" was carried unchanged, and is not compared with the reference");
+}
+
+/// Warns of grids that come back whole, although a part of their ellipsoids was asked for.
+void tellUncut(const EsvrFile& file, const std::vector<ListedGrid>& chosen, const Options& options,
+               const cli::Log& log) {
+  for (const auto& [grid, name, place] : chosen) {
+    if (grid.isCarried) continue;
+    const StoredGrid& part = storedParts(file, grid).front();
+    const std::string start = "grid \"" + shownName(name) + "\" comes back whole: ";
+    if (part.voxels && isCut(options))
+      log.warning(start + "it has voxels, and --lod and --max-ellipsoids select ellipsoids");
+    else if (options.part.layers && layerCount(part) == 1)
+      log.warning(start + "it has a single layer");
+  }
 }
 
 /// The range of the active values of a grid of the reference.
@@ -434,10 +459,15 @@ void convertFile(const Options& options, const CancelToken& cancel, const cli::L
   convertContent(options, file, cancel, log, out);
 }
 
-void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
+void convertContent(const Options& given, const EsvrFile& file, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
-  if (writesSplats(options)) return exportSplats(options, file, log);
-  const auto chosen = writable(file, chooseGrids(options.input, file, options.grids), options, log);
+  if (writesSplats(given)) return exportSplats(given, file, log);
+  const auto wanted = chooseGrids(given.input, file, given.grids);
+  Options options = given;
+  // Carried grids are left out only where the resolution does change.
+  options.resolution =
+      resolved(given.resolution, storedGrids(file, wanted), decodingOf(file, given), log);
+  const auto chosen = writable(file, wanted, options, log);
   cli::WatchedInputs watched;
   if (options.reference) watched.add(*options.reference);
   std::vector<ComparedGrid> compared;
@@ -446,8 +476,12 @@ void convertContent(const Options& options, const EsvrFile& file, const CancelTo
   if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
   tellHalfGrids(file, chosen, options, log);
+  tellUncut(file, chosen, options, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
-  if (options.reference) printErrors(options, compared, out);
+  if (options.reference) {
+    tellNotCompared(chosen, log);
+    if (!compared.empty()) printErrors(options, compared, out);
+  }
   watched.requireUnchanged();  // the errors are those of one file
 }
 

@@ -191,7 +191,7 @@ class SequenceDecoding {
     const auto written = std::ranges::count_if(done_, &Done::isWritten);
     if (cancel_.cancelled())
       throw RuntimeFailure("interrupted; " + std::to_string(written) + " of " +
-                           std::to_string(frames_.size()) + " frames are complete");
+                           cli::counted(frames_.size(), "frame") + " complete");
     std::vector<cli::FrameNumber> failed;
     for (std::size_t i = 0; i < frames_.size(); ++i)
       if (done_[i].failure) failed.push_back(frames_[i].number);

@@ -264,7 +264,8 @@ void listFrames(const Options& options, const cli::FramePattern& pattern) {
     table.add({std::to_string(frame), std::to_string(fs::file_size(path)), std::move(file.grids)});
     if (notes.empty()) notes = std::move(file.notes);
   });
-  std::cout << cli::printable(pattern.text()) << ": " << files.size() << " frames, a file each\n"
+  std::cout << cli::printable(pattern.text()) << ": " << cli::counted(files.size(), "frame")
+            << ", a file each\n"
             << cli::printable(notes) << (notes.empty() ? "\n" : "\n\n");
   table.print(std::cout);
   files.tellHint();
@@ -278,7 +279,8 @@ void listSequence(const Options& options) {
   const EsvrSummary summary = inspectEsvr(options.input);
   std::cout << cli::printable(options.input.string()) << ": .esvr format " << summary.versionMajor
             << '.' << summary.versionMinor << ", " << summary.fileBytes << " bytes, "
-            << reader.frames().size() << " frames in " << reader.groupCount() << " groups\n";
+            << cli::counted(reader.frames().size(), "frame") << " in "
+            << cli::counted(reader.groupCount(), "group") << '\n';
   printFileNotes(first.metadata);
   std::cout << '\n';
   cli::Table table({"frame", "group", "bytes", "refers to"});
@@ -504,7 +506,7 @@ void printStoredDetails(const Listing& listing, const std::string& name, const S
             << ", chunks " << grid.field.chunks.size();
   if (grid.nonFinite.total() > 0)
     std::cout << ", " << cli::textOf(grid.nonFinite) << " in "
-              << grid.nonFiniteVoxels->bricks.size() << " bricks";
+              << cli::counted(grid.nonFiniteVoxels->bricks.size(), "brick");
   if (const std::string reference = referenceOf(listing, grid); !reference.empty())
     std::cout << ", voxels refer to " << cli::printable(reference);
   std::cout << '\n';

@@ -44,12 +44,13 @@ ColorMap colorsFor(const ColorMap& colors, const StoredGrid& grid) {
 
 void tellWhatIsMissing(const MadeSplats& made, const cli::Log& log) {
   constexpr double kMuch = 1e-3;
-  const auto number = [](std::uint64_t n) { return std::to_string(n); };
-  log.detail(number(made.scene.splats.size()) + " splats of " + number(made.ellipsoids) +
-             " ellipsoids, with an extinction of " + cli::shortNumber(made.scene.densityScale) +
+  log.detail(cli::counted(made.scene.splats.size(), "splat") + " of " +
+             cli::counted(made.ellipsoids, "ellipsoid") + ", with an extinction of " +
+             cli::shortNumber(made.scene.densityScale) +
              " for a value of 1 and a unit of the world");
   if (made.negative > 0)
-    log.detail(number(made.negative) + " ellipsoids take away from others, and have no splats");
+    log.detail(cli::counted(made.negative, "ellipsoid") +
+               " of negative values, which splats cannot have, left out");
   if (made.faintShare > kMuch)
     log.warning(
         "a part of the optical depth is left out, because it is too faint for the 8 bits of "
@@ -57,7 +58,7 @@ void tellWhatIsMissing(const MadeSplats& made, const cli::Log& log) {
         cli::shortNumber(100.0 * made.faintShare) + " %");
   if (made.clamped > 0)
     log.warning("splats have the smallest or the largest size that formats keep",
-                number(made.clamped));
+                std::to_string(made.clamped));
 }
 
 }  // namespace

@@ -157,6 +157,10 @@ std::string decibels(double value) {
   return std::isinf(value) ? "exact" : formatted("%.2f", value);
 }
 std::string shortNumber(double value) { return formatted("%.4g", value); }
+std::string counted(std::uint64_t number, const std::string& thing) {
+  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
+}
+
 std::string seconds(double value) { return formatted("%.1f", value); }
 
 std::string textOf(const Box& box) {

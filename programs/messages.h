@@ -77,6 +77,8 @@ class Table {
 [[nodiscard]] std::string decibels(double value);
 /// A number with four significant digits.
 [[nodiscard]] std::string shortNumber(double value);
+/// A number of things with their noun, for example "1 voxel" and "2 voxels". \param thing  one of them
+[[nodiscard]] std::string counted(std::uint64_t number, const std::string& thing);
 /// A time with one decimal, for example "12.3", so that a column is aligned.
 [[nodiscard]] std::string seconds(double value);
 

@@ -245,7 +245,7 @@ std::string textOf(const Frame& frame) { return "frame " + std::to_string(frame.
 
 std::string sentenceOn(const std::vector<FrameNumber>& numbers, std::size_t all,
                        const std::string& what) {
-  return std::to_string(numbers.size()) + " of " + std::to_string(all) + " frames " + what + ": " +
+  return std::to_string(numbers.size()) + " of " + counted(all, "frame") + " " + what + ": " +
          textOfFrames(numbers);
 }
 

@@ -90,11 +90,23 @@ std::optional<SurfaceErrors> surfaceErrors(const VolumeGrid& source, const Volum
   return errors;
 }
 
+bool isEmpty(const SparseVolume& volume, const Box& box) {
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    bool isFound = false;
+    forEachActive(volume.active[b], [&](int v) {
+      isFound = isFound || box.contains(volume.brickCorner(b) + voxelLocal(v));
+    });
+    if (isFound) return false;
+  }
+  return true;
+}
+
 /// The errors that a summary needs.
 VolumeGrid measureValues(const Options& options, const VolumeGrid& source, ConvertedGrid& grid) {
   const CommonFitOptions& fit = options.convert.fit;
   VolumeGrid decoded{.descriptor = source.descriptor,
                      .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
+  grid.isBoxEmpty = fit.box && isEmpty(source.volume, *fit.box);
   const bool isLight =
       !grid.id.component && isLookedThrough(source.descriptor.gridClass, source.volume);
   grid.metrics = compareVolumes(source.volume, decoded.volume,

@@ -66,6 +66,7 @@ struct ConvertedGrid : GridConversion {
   std::string sourceName;                ///< GridSummary::uniqueName of the grid of the input
   NamedGrid id;                          ///< its place in the input
   VolumeMetrics metrics;                 ///< errors of the decoded grid
+  bool isBoxEmpty = false;               ///< no active voxel is in the box of --box
   std::optional<double> wantedPsnr;      ///< PSNR over the box that the grid should reach, dB
   std::optional<SurfaceErrors> surface;  ///< of a narrow band
   std::string whyNoNarrowBand;           ///< of a level set that is none (whyNoNarrowBand())

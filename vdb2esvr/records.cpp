@@ -80,8 +80,8 @@ void widen(const FrameGrid& grid, GridRange& range) {
 Error interruption(const SequenceRecord& record) {
   const auto written = std::ranges::count_if(record.frames, isWritten);
   return RuntimeFailure("interrupted; " + std::to_string(written) + " of " +
-                        std::to_string(record.frames.size()) +
-                        " frames are complete, and --resume continues with the others");
+                        cli::counted(record.frames.size(), "frame") +
+                        " complete, and --resume continues with the others");
 }
 
 }  // namespace

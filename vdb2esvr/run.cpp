@@ -147,8 +147,8 @@ void tellNothingFitted(const GridChoice& choice, const cli::Log& log) {
     return log.warning("the file has no grid; the output has its metadata only");
   log.warning("no grid is fitted; the output has carried grids only",
               std::to_string(choice.carried.size()) + " of " +
-                  std::to_string(choice.carried.size() + choice.skipped.size()) +
-                  " grids are carried unchanged");
+                  cli::counted(choice.carried.size() + choice.skipped.size(), "grid") +
+                  " carried unchanged");
 }
 
 void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log& log) {
@@ -158,14 +158,21 @@ void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log&
   if (grid.nonFiniteReplaced > 0)
     log.warning(
         "grid \"" + grid.uniqueName + "\": NaN or infinite voxels were replaced by " + replacement,
-        std::to_string(grid.nonFiniteReplaced) + " voxels");
+        cli::counted(grid.nonFiniteReplaced, "voxel"));
   if (const NonFiniteCounts& kept = grid.stored().nonFinite; kept.total() > 0)
     log.info("grid \"" + grid.uniqueName + "\": " + cli::textOf(kept) +
              (kept.total() == 1 ? " is kept" : " are kept") +
              ", and all errors are those of the others");
+  if (grid.stored().descriptor.gridClass == GridClass::kLevelSet && grid.inactive.min() < 0.0)
+    log.warning(
+        "grid \"" + grid.uniqueName +
+        "\": the signs of inactive voxels inside the surface are lost; --lossless or --keep "
+        "keeps them");
+  if (grid.isBoxEmpty)
+    log.warning("grid \"" + grid.uniqueName + "\" has no active voxel in the box of --box");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)
     log.warning("grid \"" + grid.uniqueName + "\": the memory of the GPU was full",
-                std::to_string(grid.stored().field.ellipsoidCount()) + " ellipsoids instead of " +
+                cli::counted(grid.stored().field.ellipsoidCount(), "ellipsoid") + " instead of " +
                     std::to_string(fit.wanted));
   log.detail("grid \"" + grid.uniqueName + "\": kappa " +
              cli::shortNumber(grid.stored().field.kernel.kappa) + ", " +

@@ -68,7 +68,8 @@ void printSurface(const ConvertedGrid& grid, std::ostream& out) {
   if (!grid.surface || !grid.surface->distance) return;
   out << cli::printable(grid.uniqueName) << ": the surface moves by at most "
       << cli::shortNumber(grid.surface->distance->voxels) << " voxels, and "
-      << grid.surface->signs.voxels << " voxels change sign\n";
+      << cli::counted(grid.surface->signs.voxels, "voxel")
+      << (grid.surface->signs.voxels == 1 ? " changes sign\n" : " change sign\n");
 }
 
 /// Says which values of inactive voxels the file does not hold, and how to keep them.
@@ -246,7 +247,7 @@ std::string rangeText(const GridRange& range) {
 void printRanges(const SequenceRecord& record, std::ostream& out) {
   for (const GridRange& range : gridRanges(record))
     out << cli::printable(range.name) << ": " << rangeText(range) << " over the active voxels of "
-        << range.frames << (range.frames == 1 ? " frame\n" : " frames\n");
+        << cli::counted(range.frames, "frame") << '\n';
 }
 
 /// Says what became of grids that were not fitted, each once with the number of its frames.
@@ -256,9 +257,8 @@ void printNotFittedIn(const SequenceRecord& record, std::vector<NotFittedName> F
   for (const FrameRecord& frame : record.frames)
     for (const NotFittedName& grid : frame.*grids) ++counts[{grid.name, grid.why}];
   for (const auto& [grid, frames] : counts)
-    out << cli::printable(grid.first) << ": " << what << " in " << frames
-        << (frames == 1 ? " frame" : " frames") << ", because " << cli::printable(grid.second)
-        << '\n';
+    out << cli::printable(grid.first) << ": " << what << " in " << cli::counted(frames, "frame")
+        << ", because " << cli::printable(grid.second) << '\n';
 }
 
 /// Says how the frames are divided into the groups of one file.
@@ -267,8 +267,8 @@ void printGroups(const Options& options, const SequenceRecord& record, std::ostr
   std::vector<cli::FrameNumber> differing;
   for (const FrameRecord& frame : record.frames)
     if (frame.gridsDiffer) differing.push_back(frame.frame.number);
-  out << cli::printable(options.output.string()) << ": " << record.file->groups
-      << (record.file->groups == 1 ? " group" : " groups") << " of at most " << kGroupFrames
+  out << cli::printable(options.output.string()) << ": "
+      << cli::counted(record.file->groups, "group") << " of at most " << kGroupFrames
       << " frames\n";
   if (!differing.empty())
     out << (differing.size() == 1 ? "frame " : "frames ") << cli::textOfFrames(differing)

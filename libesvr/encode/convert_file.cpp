@@ -16,6 +16,8 @@
 
 #include "core/add_seconds.h"
 #include "encode/grids_of_file.h"
+#include "encode/job.h"
+#include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -222,6 +224,7 @@ void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish&
 namespace {
 
 using encode::GridConverter;
+using encode::SizeTooSmall;
 
 // Grids of equal voxels.
 
@@ -312,12 +315,16 @@ std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size)
 /// Subtracts without passing 0.
 std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
 
-/// Divides the wanted size of a file among its grids. Every grid gets the few bytes that the smallest one
-/// takes, and grids share the others by their active voxels. Bytes that a grid does not use go to those that
+/// The bytes that grids were found to need, by their indices.
+using LeastBytes = std::map<std::size_t, std::uint64_t>;
+
+/// Divides the wanted size of a file among its grids. Every grid gets a few bytes, or those that it was found to
+/// need, and grids share the others by their active voxels. Bytes that a grid does not use go to those that
 /// are converted after it. Twins of a grid have no share; the bytes of their records are reserved.
 class ByteShares {
  public:
-  ByteShares(const FileSource& source, std::optional<std::uint64_t> size, const Twins& twins)
+  ByteShares(const FileSource& source, std::optional<std::uint64_t> size, const Twins& twins,
+             const LeastBytes& needed)
       : left_(size), shares_(source.grids.size()) {
     // A file without grids has nothing to divide, and no option makes it smaller.
     if (source.grids.empty() && source.carried.empty()) left_.reset();
@@ -329,20 +336,19 @@ class ByteShares {
         continue;
       }
       weightLeft_ += shares_[g].weight = double(source.grids[g].activeVoxels) + 1.0;
-      ++gridsLeft_;
     }
-    // The record of a grid, its rows in the table, and the codes of a few values. Shares by active
-    // voxels alone would be too small for a grid of a few voxels beside a large one.
-    constexpr std::uint64_t kLeastOfGrid = 512;
-    if (gridsLeft_ > 0) least_ = std::min(kLeastOfGrid, *left_ / gridsLeft_);
+    setLeast(needed);
   }
+
+  /// True if grids need more bytes than there are, and get them.
+  [[nodiscard]] bool isOverdrawn() const { return isOverdrawn_; }
 
   /// Bytes for a grid without its twins; nothing if no size is wanted.
   [[nodiscard]] std::optional<std::uint64_t> of(std::size_t grid) const {
     if (!left_) return std::nullopt;
-    const std::uint64_t divided = less(*left_, least_ * gridsLeft_);
-    const std::uint64_t least = std::min(least_, *left_ / gridsLeft_);
-    return least + std::uint64_t(double(divided) * shares_[grid].weight / weightLeft_);
+    const Share& share = shares_[grid];
+    const double divided = double(less(*left_, leastLeft_));
+    return share.least + std::uint64_t(divided * share.weight / weightLeft_);
   }
 
   /// Subtracts the bytes of a converted grid and of its twins.
@@ -357,7 +363,7 @@ class ByteShares {
     if (bytes > allowed) return bytes - allowed;
     left_ = less(*left_ + share.reserved, bytes);
     weightLeft_ -= share.weight;
-    --gridsLeft_;
+    leastLeft_ -= share.least;
     return 0;
   }
 
@@ -365,6 +371,7 @@ class ByteShares {
   /// A grid that is not a twin.
   struct Share {
     double weight = 0.0;
+    std::uint64_t least = 0;
     std::vector<GridDescriptor> twins;
     std::uint64_t reserved = 0;  ///< expected bytes of the twins
   };
@@ -375,6 +382,26 @@ class ByteShares {
     share.twins.push_back(twin.descriptor);
     share.reserved += bytes;
     left_ = less(*left_, bytes);
+  }
+
+  /// Gives grids the bytes that they need, and the others the same few bytes.
+  void setLeast(const LeastBytes& needed) {
+    for (const auto& [g, bytes] : needed) leastLeft_ += shares_[g].least = bytes;
+    // A file of small grids takes fewer bytes than its grids, each for itself, so that it may still fit.
+    isOverdrawn_ = leastLeft_ > *left_;
+    left_ = std::max(*left_, leastLeft_);
+    const auto isOther = [&](std::size_t g) {
+      return shares_[g].weight > 0.0 && !needed.contains(g);
+    };
+    std::uint64_t others = 0;
+    for (std::size_t g = 0; g < shares_.size(); ++g) others += isOther(g);
+    if (others == 0) return;
+    // The record of a grid, its rows in the table, and the codes of a few values. Shares by active
+    // voxels alone would be too small for a grid of a few voxels beside a large one.
+    constexpr std::uint64_t kLeastOfGrid = 512;
+    const std::uint64_t least = std::min(kLeastOfGrid, less(*left_, leastLeft_) / others);
+    for (std::size_t g = 0; g < shares_.size(); ++g)
+      if (isOther(g)) leastLeft_ += shares_[g].least = least;
   }
 
   /// Bytes of a converted grid with its twins.
@@ -389,9 +416,9 @@ class ByteShares {
 
   std::optional<std::uint64_t> left_;  ///< bytes without those reserved
   double weightLeft_ = 0.0;
-  std::uint64_t gridsLeft_ = 0;  ///< that have no bytes yet
-  std::uint64_t least_ = 0;      ///< bytes that every grid gets
-  std::vector<Share> shares_;    ///< one for each grid; that of a twin is not used
+  std::uint64_t leastLeft_ = 0;  ///< the least bytes of the grids that have none yet
+  bool isOverdrawn_ = false;
+  std::vector<Share> shares_;  ///< one for each grid; that of a twin is not used
 };
 
 // Every grid of a file.
@@ -407,14 +434,20 @@ class GridsConversion {
   std::vector<std::optional<GridConversion>> run() {
     converter_.findScales();
     twins_ = findTwins(source_.grids, converter_);
-    ByteShares shares(source_, options_.size, twins_);
+    ByteShares shares(source_, options_.size, twins_, {});
     convertSmall();
-    for (const std::size_t g : order())
-      if (!made_[g] && !twins_.contains(g) && !converter_.isCancelled()) convert(g, shares);
+    while (!convertAll(shares)) {
+      earlier_ = std::exchange(made_, std::vector<std::optional<GridConversion>>(made_.size()));
+      shares = ByteShares(source_, options_.size, twins_, needed_);
+    }
+    isOverdrawn_ = shares.isOverdrawn();
     for (const auto& [g, twin] : twins_)
       if (made_[twin.of]) made_[g] = twinOf(*made_[twin.of], g, twin);
     return std::move(made_);
   }
+
+  /// True if grids have more bytes than the size allows, so that the size of the file has to be looked at.
+  [[nodiscard]] bool isOverdrawn() const { return isOverdrawn_; }
 
  private:
   /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
@@ -451,10 +484,37 @@ class GridsConversion {
     return order;
   }
 
+  /// Converts the grids that are not made yet, twins aside.
+  /// \return false if one needs more bytes than its share, so that the size must be divided again
+  bool convertAll(ByteShares& shares) {
+    for (const std::size_t g : order()) {
+      if (made_[g] || twins_.contains(g) || converter_.isCancelled()) continue;
+      const std::uint64_t share = shares.of(g).value_or(0);
+      try {
+        convert(g, shares);
+      } catch (const SizeTooSmall& error) {
+        if (source_.grids.size() == 1) throw;
+        // With other bytes another fit may need a few more. These steps end such a search soon.
+        needed_[g] = share + std::max(error.missing, share / 8 + 8);
+        return false;
+      }
+    }
+    return true;
+  }
+
+  /// Takes what was made by an earlier division of the size, where its bytes suit this one too.
+  bool takeEarlier(std::size_t g, ByteShares& shares) {
+    if (earlier_.empty() || !earlier_[g]) return false;
+    if (shares.take(g, earlier_[g]->conversion.grid, converter_.previousOf(g)) > 0) return false;
+    made_[g] = std::move(earlier_[g]);
+    return true;
+  }
+
   /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for
   /// every section. How many there are is known after a conversion only; where they exceed what is
   /// reserved for the twins, the grid is converted again to fewer bytes.
   void convert(std::size_t g, ByteShares& shares) try {
+    if (takeEarlier(g, shares)) return;
     std::optional<std::uint64_t> bytes = shares.of(g);
     GridConversion grid = converter_.make(g, {.bytes = bytes});
     const auto excessOf = [&]() -> std::uint64_t {
@@ -476,7 +536,10 @@ class GridsConversion {
   const FileOptions& options_;
   GridConverter& converter_;
   Twins twins_;
+  LeastBytes needed_;
+  bool isOverdrawn_ = false;
   std::vector<std::optional<GridConversion>> made_;
+  std::vector<std::optional<GridConversion>> earlier_;  ///< by another division of the size
 };
 
 // Vectors, and the file.
@@ -563,6 +626,14 @@ void assemble(FileSource& source, ConvertedFile& made) {
   if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
 }
 
+void requireSize(const EsvrFile& file, std::uint64_t size) {
+  const std::size_t bytes = encodeEsvr(file).size();
+  if (bytes > size)
+    throw UsageError("the smallest file that was found takes " + std::to_string(bytes) +
+                     " bytes; the size allows " + std::to_string(size) +
+                     ", and to skip some grids makes room");
+}
+
 }  // namespace
 
 std::string GridSource::storedName() const {
@@ -573,7 +644,8 @@ ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
   const CancelScope scope(CancelScope::orToken(options.convert.fit.cancel));
   GridConverter converter(source.grids, options);
   ConvertedFile made;
-  made.grids = completeOnes(source.grids, GridsConversion(source, options, converter).run());
+  GridsConversion conversion(source, options, converter);
+  made.grids = completeOnes(source.grids, conversion.run());
   made.interrupted = converter.isCancelled();
   {
     const Completion completion;
@@ -583,6 +655,10 @@ ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
   }
   encode::shareGrids(options, converter, made);
   made.interrupted = converter.isCancelled();
+  if (conversion.isOverdrawn()) {
+    made.file.layout = FileLayout::kCompact;
+    requireSize(made.file, *options.size);
+  }
   return made;
 }
 

@@ -46,6 +46,7 @@ bool seesPictures(const Job& job) { return job.judge && job.judge->seesPictures(
 
 double psnrOf(const Job& job, SparseVolume volume) {
   if (job.judge) return (*job.judge)(std::move(volume)).quality;
+  forgiveFilled(job.input.source, job.options.filled, volume);
   return psnrOverBox(job.input.source, volume,
                      {.box = job.options.fit.box, .peak = job.options.fit.peak});
 }

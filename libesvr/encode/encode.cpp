@@ -140,11 +140,12 @@ class Choice {
 
   bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
 
-  UsageError tooSmall(std::uint64_t needed) const {
+  SizeTooSmall tooSmall(std::uint64_t needed) const {
     const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
                                          : "has no voxels of that size";
-    return UsageError("grid '" + shownName(job_.input.descriptor.name) + "' " + takes +
-                      "; the size allows " + std::to_string(*goal_.bytes));
+    return {"grid '" + shownName(job_.input.descriptor.name) + "' " + takes + "; the size allows " +
+                std::to_string(*goal_.bytes),
+            needed > *goal_.bytes ? needed - *goal_.bytes : 0};
   }
 
   Conversion ellipsoidsAlone() {

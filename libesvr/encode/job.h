@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "esvr/encode.h"
 #include "esvr/error.h"
@@ -30,6 +31,12 @@ struct Job {
 };
 inline constexpr int kAveraged = 2;
 
+/// A size that no form of a grid keeps to.
+struct SizeTooSmall : UsageError {
+  SizeTooSmall(const std::string& what, std::uint64_t by) : UsageError(what), missing(by) {}
+  std::uint64_t missing;  ///< bytes by which the size is too small; 0: unknown
+};
+
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.
 [[nodiscard]] bool isCancelled(const Job& job);
 
@@ -54,6 +61,10 @@ template <class Work>
 
 /// True if the quality of the job is what is seen.
 [[nodiscard]] bool seesPictures(const Job& job);
+
+/// Makes the voxels of a decoded volume that were filled (ConvertOptions::filled) equal to those of the source, so that
+/// their errors count in no PSNR. \param filled  null: none were (tone.cpp)
+void forgiveFilled(const SparseVolume& source, const VoxelLayer* filled, SparseVolume& volume);
 
 /// Quality of a volume or of a decoded grid, dB: by the job's judge (tone.h), or its PSNR over the box.
 [[nodiscard]] double psnrOf(const Job& job, SparseVolume volume);

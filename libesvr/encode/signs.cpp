@@ -268,9 +268,9 @@ void requireSigns(const ConvertInput& input, const SparseVolume& decoded) {
   const SignErrors errors = compareSigns(input.source, decoded);
   const std::string grid = "grid '" + shownName(input.descriptor.name) + "': ";
   if (errors.first)
-    throw RuntimeFailure(grid + std::to_string(errors.voxels) +
-                         " voxels are on the wrong side of the surface, for example voxel " +
-                         toString(*errors.first));
+    throw RuntimeFailure(
+        grid + std::to_string(errors.voxels) + (errors.voxels == 1 ? " voxel is" : " voxels are") +
+        " on the wrong side of the surface, for example voxel " + toString(*errors.first));
   if (!EmptySigns(decoded).agree())
     throw RuntimeFailure(grid + "the surface of the decoded voxels has holes");
 }

@@ -45,6 +45,19 @@ double sumOfBricks(const SparseVolume& volume, const Of& of) {
 
 }  // namespace
 
+void forgiveFilled(const SparseVolume& source, const VoxelLayer* filled, SparseVolume& volume) {
+  if (!filled) return;
+  parallelFor(std::size_t{0}, filled->bricks.size(), [&](std::size_t b) {
+    const Coord corner = filled->origin + filled->bricks[b] * kBrickSide;
+    const auto to = findBrick(volume, brickOf(corner - volume.origin));
+    const auto from = findBrick(source, brickOf(corner - source.origin));
+    if (!to || !from) return;
+    forEachActive(filled->active[b], [&](int v) {
+      volume.brickValues(*to)[std::size_t(v)] = source.brickValues(*from)[std::size_t(v)];
+    });
+  });
+}
+
 bool Judge::seesPictures(const ConvertInput& input, const ConvertOptions& options) {
   const bool mayBe = options.measure == Measure::kAuto && leavesTheMeasure(options.goal);
   if (!mayBe && !std::holds_alternative<PictureGoal>(options.goal)) return false;
@@ -79,23 +92,9 @@ void Judge::toValues(SparseVolume& volume) const {
   if (halfs_) roundToHalfs(volume);
 }
 
-/// Makes the filled voxels equal to the source's, so that their errors do not count.
-void Judge::forgiveFilled(SparseVolume& volume) const {
-  if (!filled_) return;
-  parallelFor(std::size_t{0}, filled_->bricks.size(), [&](std::size_t b) {
-    const Coord corner = filled_->origin + filled_->bricks[b] * kBrickSide;
-    const auto to = findBrick(volume, brickOf(corner - volume.origin));
-    const auto from = findBrick(values_, brickOf(corner - values_.origin));
-    if (!to || !from) return;
-    forEachActive(filled_->active[b], [&](int v) {
-      volume.brickValues(*to)[std::size_t(v)] = values_.brickValues(*from)[std::size_t(v)];
-    });
-  });
-}
-
 Judge::Judgement Judge::operator()(SparseVolume volume) const {
   toValues(volume);
-  forgiveFilled(volume);
+  forgiveFilled(values_, filled_, volume);
   const auto ofValues = [&] { return psnrOverBox(values_, volume, box_); };
   if (!pictures_) return {ofValues()};
   const TransmittancePsnr seen = pictures_->measure(volume);

@@ -44,7 +44,6 @@ class Judge {
 
  private:
   void toValues(SparseVolume& volume) const;
-  void forgiveFilled(SparseVolume& volume) const;
 
   const SparseVolume& values_;
   const VoxelLayer* filled_;  ///< ConvertOptions::filled

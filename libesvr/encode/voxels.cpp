@@ -278,6 +278,7 @@ double VoxelSearch::psnrOn(const SparseVolume& volume, const VoxelLayer& layer) 
   SparseVolume made = volumeOf(layer);
   if (job_.judge && &volume == &job_.input.source) return (*job_.judge)(std::move(made)).quality;
   if (decodedValues(job_) == DecodedValues::kHalfs) roundToHalfs(made);
+  forgiveFilled(volume, job_.options.filled, made);
   return psnrOverBox(volume, made, {.box = box_, .peak = peak_}) +
          10.0 * std::log10(shareOf(volume)) + judged_;
 }
@@ -504,7 +505,9 @@ void VoxelSearch::matchJudge() {
   for (int n = 0; n < 2; ++n) {
     const VoxelLayer layer = layerOf(source, {.octave = octave});
     const double quality = psnrOn(source, layer);
-    judged_ = quality - psnrOverBox(source, volumeOf(layer), {.box = box_, .peak = peak_});
+    SparseVolume made = volumeOf(layer);
+    forgiveFilled(source, job_.options.filled, made);
+    judged_ = quality - psnrOverBox(source, made, {.box = box_, .peak = peak_});
     if (!std::isfinite(judged_)) judged_ = 0.0;
     if (!goal_.psnr || !std::isfinite(quality)) break;
     octave = std::clamp(octave + (*goal_.psnr - quality) / kDbPerOctave, kCoarsest, kFinest);

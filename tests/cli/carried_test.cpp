@@ -60,9 +60,16 @@ TEST_F(CarriedFile, LeavesOutTheGridsThatAreNamedBySkip) {
 
 TEST_F(CarriedFile, WithNothingToFitIsConvertedWithAWarning) {
   EXPECT_THAT(succeeded(fitQuickly("-g int32 -g empty")).err,
-              HasSubstr("carried grids only (2 of 2 grids are carried unchanged)"));
+              HasSubstr("carried grids only (2 of 2 grids carried unchanged)"));
   convertBack();
   EXPECT_EQ(bytesIn(back()), bytesIn(in(), {1, 5}));
+}
+
+TEST_F(CarriedFile, IsComparedWhereGridsAreNotCarried) {
+  succeeded(fitQuickly("-g int32 -g empty"));
+  const auto run = succeeded(esvr2vdb({out(), back(), "--reference", in()}));
+  EXPECT_THAT(run.err, Says("\"int32\" was carried unchanged, and is not compared", "\"empty\""));
+  EXPECT_EQ(run.out, "");
 }
 
 TEST_F(CarriedFile, IsSummarisedAndReported) {

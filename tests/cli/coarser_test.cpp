@@ -84,6 +84,16 @@ TEST_F(CoarserGrid, isAsLargeAsTheMemoryAllows) {
             2 * readEsvr(out()).grids.front().activeVoxels);
 }
 
+TEST_F(CoarserGrid, leavesCarriedGridsWhereTheMemoryAllowsAllVoxels) {
+  std::filesystem::remove(in());
+  writeInput(in(), {{.voxels = softBall({})}, {.name = "kept", .voxels = softBall({})}});
+  succeeded(quickFit(in(), out(), "--force --keep kept"));
+  EXPECT_EQ(succeeded(write("--coarsen auto")).err, "");
+  EXPECT_THAT(inspectVdb(back()).grids, testing::SizeIs(2));
+  EXPECT_THAT(succeeded(write("--coarsen 2")).err, HasSubstr("is left out"));
+  EXPECT_THAT(inspectVdb(back()).grids, testing::SizeIs(1));
+}
+
 TEST_F(CoarserGrid, ofVectorsIsThatOfTheirComponents) {
   writeVectorInput(in(), {.voxels = softBall({})});
   succeeded(

@@ -118,6 +118,39 @@ TEST_F(Esvr2Vdb, saysSoWhereAThresholdLeavesNothing) {
               HasSubstr("comes back without an active voxel"));
 }
 
+TEST_F(Vdb2Esvr, warnsOfGridsThatCannotComeBackInPart) {
+  succeeded(vdb2esvr({in(), out(), "--lossless"}));
+  for (const Words& part : {Words{"--lod", "1"}, {"--max-ellipsoids", "3"}})
+    EXPECT_THAT(succeeded(esvr2vdb(joined({out(), back(), "--force"}, part))).err,
+                HasSubstr("grid \"density\" comes back whole: it has voxels"));
+  succeeded(fitQuickly("--force"));
+  EXPECT_THAT(succeeded(esvr2vdb({out(), back(), "--force", "--lod", "1"})).err,
+              HasSubstr("grid \"density\" comes back whole: it has a single layer"));
+}
+
+/// Where a surface has a hole, no flood fill can tell the inside from the outside.
+TEST_F(Vdb2Esvr, warnsWhereTheInsideOfALevelSetIsLost) {
+  const auto write = [&](int end) {
+    InputGrid grid{.background = 3.0f, .levelSet = true};
+    for (const InputVoxel& voxel : distances(12))
+      if (std::abs(voxel.value) < 3.0f && voxel.at.x < end)
+        grid.voxels.push_back(voxel);
+      else if (voxel.value < 0.0f)
+        grid.inactive.push_back({voxel.at, -3.0f});
+    std::filesystem::remove(in());
+    writeInput(in(), {grid});
+    return succeeded(vdb2esvr({in(), out(), "--force", "--preset", "draft"})).err;
+  };
+  EXPECT_EQ(write(13), "");
+  EXPECT_THAT(write(1), HasSubstr("grid \"density\": the signs of inactive voxels inside"));
+}
+
+TEST_F(Vdb2Esvr, warnsWhereNoVoxelIsInTheBox) {
+  EXPECT_THAT(succeeded(fitQuickly("--box 900,900,900,910,910,910")).err,
+              HasSubstr("grid \"density\" has no active voxel in the box"));
+  EXPECT_EQ(succeeded(fitQuickly("--force --box 0,0,0,910,910,910")).err, "");
+}
+
 TEST_F(Esvr2Vdb, printsTheErrorAgainstAReference) {
   const auto run = succeeded(esvr2vdb({in(), out(), "--reference", source()}));
   for (const char* word : {"PSNR box", "PSNR T 0.5", "SSIM", "IoU", "mass ref", "density", "heat"})
@@ -200,7 +233,8 @@ TEST_F(Esvr2Vdb, listsTheFrameRateOfASequence) {
   const std::string pattern = folder_ / "f.@.vdb", file = folder_ / "f.esvr";
   succeeded(vdb2esvr({pattern, file, "--lossless"}));
   EXPECT_THAT(esvr2vdb({"--list", pattern}).out, HasSubstr(" a file each\nfps 24\n\n"));
-  EXPECT_THAT(esvr2vdb({"--list", file}).out, Says(" groups\nfps 24\n\n", "\nct: length_unit mm"));
+  EXPECT_THAT(esvr2vdb({"--list", file}).out,
+              Says(" in 1 group\nfps 24\n\n", "\nct: length_unit mm"));
 }
 
 TEST_F(Esvr2Vdb, saysThatNanoVdbHoldsNoMetadata) {

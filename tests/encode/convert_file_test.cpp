@@ -13,6 +13,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <random>
 #include <set>
 
 #include "encode/volumes.h"
@@ -199,6 +200,33 @@ TEST(ConvertGridsToSize, RefusesWhatLeavesNothingForTheGrids) {
   } catch (const UsageError& error) {
     EXPECT_THAT(error.what(), HasSubstr("without any fitted grid; the size allows 40"));
   }
+}
+
+/// A name that does not become smaller.
+std::string longName() {
+  std::string name(900, ' ');
+  std::mt19937 random(1);
+  for (char& letter : name) letter = char('!' + random() % 90);
+  return name;
+}
+
+/// A grid with a long name needs more than the few bytes that every grid gets at first, whether it is converted
+/// before or after the one that has bytes to spare.
+TEST(ConvertGridsToSize, GivesAGridTheBytesThatItNeeds) {
+  constexpr std::uint64_t kSize = 3000;
+  const SparseVolume cloud = test::smoothVolume(), ball = softBall({}, 1.0f, 3.0);
+  for (const FileSource& file : {fileOf({{"large", cloud}, {longName(), ball}}),
+                                 fileOf({{longName(), ball}, {"large", cloud}})}) {
+    const std::uint64_t bytes = encodeEsvr(convertGrids(file, sizedOptions(kSize)).file).size();
+    EXPECT_LE(bytes, kSize);
+    EXPECT_GE(double(bytes), 0.9 * double(kSize));
+  }
+}
+
+TEST(ConvertGridsToSize, IsRefusedIfNothingFits) {
+  const SparseVolume ball = softBall({}, 1.0f, 3.0), other = softBall({}, 2.0f, 4.0);
+  EXPECT_THROW((void)convertGrids(fileOf({{"a", ball}, {longName(), other}}), sizedOptions(900)),
+               UsageError);
 }
 
 TEST(ConvertGridsToSize, GivesTheBytesThatTwinsDoNotTakeToTheOthers) {

@@ -17,9 +17,11 @@
 
 #include "../field/random_field.h"
 #include "../fit/volumes.h"
+#include "encode/tone.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/non_finite_section.h"
 #include "support/non_finite.h"
 
 namespace esvr {
@@ -290,6 +292,35 @@ SparseVolume smokeWith(const std::function<bool(Coord)>& gap) {
 }
 
 // Means without the relaxation have creases in the ball, which take 4 % more bytes than the smoke.
+/// The quality of a conversion is that of the other voxels, whether it is measured by values or by what is seen. Errors
+/// at the others count.
+TEST(FilledVoxels, CountInNoQuality) {
+  const SparseVolume damagedSource = damagedBall();
+  const auto layer = format::nonFiniteLayer(damagedSource);
+  ASSERT_TRUE(layer);
+  const SparseVolume source = withFilledVoxels(damagedSource, ValueType::kFloat, Filling::kMeans);
+  const auto changed = [&](bool atFilled) {
+    SparseVolume volume = source;
+    for (std::size_t n = 0; n < volume.values.size(); ++n)
+      if (std::isfinite(damagedSource.values[n]) != atFilled && source.values[n] > 0.1f)
+        volume.values[n] *= 0.9f;
+    return volume;
+  };
+  GridDescriptor descriptor;
+  descriptor.gridClass = GridClass::kFogVolume;
+  const ConvertInput input{descriptor, source};
+  ConvertOptions options;
+  options.goal = PictureGoal{40.0};
+  options.filled = &*layer;
+  const encode::Judge judge(input, options, {});
+  ASSERT_TRUE(judge.seesPictures());
+  for (const encode::Judge* by : {&judge, static_cast<const encode::Judge*>(nullptr)}) {
+    const encode::Job job{input, options, by};
+    EXPECT_EQ(psnrOf(job, changed(true)), HUGE_VAL);
+    EXPECT_LT(psnrOf(job, changed(false)), 40.0);
+  }
+}
+
 TEST(FilledVoxels, TakeNoMoreBytesThanTheVoxelsThatTheyReplace) {
   ConvertOptions options;
   options.goal = PsnrGoal{27.0};

@@ -258,6 +258,12 @@ TEST(CommandLine, versionNamesEveryPart) {
     EXPECT_THAT(text, HasSubstr(part));
 }
 
+TEST(Counted, HasThePluralUnlessThereIsOne) {
+  EXPECT_EQ(counted(0, "voxel"), "0 voxels");
+  EXPECT_EQ(counted(1, "voxel"), "1 voxel");
+  EXPECT_EQ(counted(2, "active voxel"), "2 active voxels");
+}
+
 TEST(RequireRange, refusesWhatLiesOutsideAndNaN) {
   EXPECT_NO_THROW(requireRange("x", 1, 1, 3));
   EXPECT_THROW(requireRange("x", 4, 1, 3), UsageError);
