@@ -444,7 +444,7 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
     return roundedBy(job_, attempt.grid, attempt.fit, {.loss = loss},
                      [&](const CompactOptions& options) {
                        if (!compactor) compactor.emplace(attempt.grid, job_.input.source, options);
-                       return steps ? compactor->at(*steps) : compactor->nearGoal();
+                       return steps ? compactor->at(*steps) : compactor->toGoal();
                      });
   };
   CompactResult made = rounded(nullptr);

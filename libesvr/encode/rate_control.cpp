@@ -369,15 +369,10 @@ RateTrial balanced(RateTrials& trials, const RateTrial& here) {
           std::uint64_t(std::max(double(here.bytes) - saved, 0.0))};
 }
 
-/// Octaves by which steps must be finer to reach the aim.
-double octavesTo(const StepGoal& goal, const RateTrial& trial) {
-  return (goal.aim() - goal.figure(trial)) / goal.slope();
-}
-
 /// The best steps for a goal. If no trial meets it, the result is the one that misses it by the least.
 RateTrial chooseSteps(RateTrials& trials, const StepGoal& goal, const QuantiserSteps& guess) {
   const RateTrial expected = balanced(trials, approach(trials, goal, guess));
-  return scaleTo(trials, goal, expected.steps, octavesTo(goal, expected));
+  return scaleTo(trials, goal, expected.steps, (goal.aim() - goal.figure(expected)) / goal.slope());
 }
 
 StepGoal errorGoal(const RateTrials& trials, double allowed) {
@@ -426,16 +421,6 @@ RateTrial chosen(RateTrials& trials, const CompactOptions& options) {
   if (options.quick) return trials.make(guess);
   if (trials.leastError() >= allowed) return trials.make(scaled(guess, kFinestFactor));
   return chooseSteps(trials, errorGoal(trials, allowed), guess);
-}
-
-/// Balanced steps whose error should be the allowed one, without the trials that find it exactly.
-RateTrial nearlyChosen(RateTrials& trials, const CompactOptions& options) {
-  const double allowed = allowedError(trials, options);
-  const QuantiserSteps guess = stepsWithin(trials, allowed);
-  if (trials.leastError() >= allowed) return trials.make(scaled(guess, kFinestFactor));
-  const StepGoal goal = errorGoal(trials, allowed);
-  const RateTrial expected = balanced(trials, approach(trials, goal, guess));
-  return trials.make(finer(expected.steps, octavesTo(goal, expected)));
 }
 
 /// What the PSNR of a result exceeds the wanted one by, dB.
@@ -517,11 +502,6 @@ Compactor::Compactor(const StoredGrid& grid, const SparseVolume& source,
 CompactResult Compactor::toGoal() {
   if (!trials_) return {grid_, {}, 0.0, 0};
   return resultOf(chosen(*trials_, options_));
-}
-
-CompactResult Compactor::nearGoal() {
-  if (!trials_) return {grid_, {}, 0.0, 0};
-  return resultOf(nearlyChosen(*trials_, options_));
 }
 
 CompactResult Compactor::at(const QuantiserSteps& steps) {

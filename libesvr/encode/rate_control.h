@@ -104,8 +104,6 @@ class Compactor {
 
   /// The best result within the goal of the options.
   [[nodiscard]] CompactResult toGoal();
-  /// A result with balanced steps whose PSNR is about that of the goal, after few trials.
-  [[nodiscard]] CompactResult nearGoal();
   [[nodiscard]] CompactResult at(const QuantiserSteps& steps);
 
  private:
