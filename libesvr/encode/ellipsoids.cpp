@@ -127,7 +127,7 @@ void reserveLayerErrors(const Job& job, StoredGrid& grid) {
 /// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
 /// cancelled meanwhile. Rate control passes over the whole volume on the device of the fit, or on the
 /// CPU if the fit was divided into chunks, because the volume may not fit into the GPU's memory.
-/// \param round  makes the result for the options that the job completes
+/// \param round  makes the result; its argument is the target with the box, the peak and the device of the job
 template <class Round>
 CompactResult roundedBy(const Job& job, const StoredGrid& grid, const FitResult& fit,
                         CompactOptions target, const Round& round) {

@@ -1,7 +1,7 @@
 #pragma once
 /// Rate control of ellipsoids: the steps of the four parameter streams with which a fitted grid takes the fewest bytes for
-/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid() (esvr/encode.h), or Compactor
-/// where it judges several results.
+/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid() (esvr/encode.h). A
+/// search that judges several results of one grid uses Compactor.
 
 #include <cstddef>
 #include <cstdint>
@@ -96,7 +96,8 @@ class RateTrials {
 /// Steps that are finer by a number of octaves.
 [[nodiscard]] QuantiserSteps finer(QuantiserSteps steps, double octaves);
 
-/// Rounds one grid several times, where a caller judges what it got. compactGrid() rounds once.
+/// Compacts one grid several times, for a search that judges each result. compactGrid() does it once. Between the results,
+/// the trials and their memory stay.
 class Compactor {
  public:
   /// The grid and the source must outlive the object. \throws DeviceError  the GPU cannot be used
@@ -104,6 +105,7 @@ class Compactor {
 
   /// The best result within the goal of the options.
   [[nodiscard]] CompactResult toGoal();
+  /// The result with given steps, whatever the goal is.
   [[nodiscard]] CompactResult at(const QuantiserSteps& steps);
 
  private:

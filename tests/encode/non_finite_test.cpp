@@ -291,7 +291,6 @@ SparseVolume smokeWith(const std::function<bool(Coord)>& gap) {
   });
 }
 
-// Means without the relaxation have creases in the ball, which take 4 % more bytes than the smoke.
 /// The quality of a conversion is that of the other voxels, whether it is measured by values or by what is seen. Errors
 /// at the others count.
 TEST(FilledVoxels, CountInNoQuality) {
@@ -321,6 +320,7 @@ TEST(FilledVoxels, CountInNoQuality) {
   }
 }
 
+/// Means without the relaxation have creases in the ball, which take 4 % more bytes than the smoke.
 TEST(FilledVoxels, TakeNoMoreBytesThanTheVoxelsThatTheyReplace) {
   ConvertOptions options;
   options.goal = PsnrGoal{27.0};

@@ -189,6 +189,19 @@ TEST(CompactGrid, GivesTheSameBytesOnOneThread) {
   EXPECT_EQ(bytesOf(compactGrid(tube().grid, tube().source).grid), many);
 }
 
+TEST(Compactor, ResultsDoNotDependOnTheOnesBefore) {
+  const CompactOptions options{.loss = 0.2};
+  encode::Compactor compactor(tube().grid, tube().source, options);
+  const CompactResult first = compactor.toGoal();
+  EXPECT_EQ(bytesOf(first.grid), bytesOf(compactGrid(tube().grid, tube().source, options).grid));
+  const QuantiserSteps steps = encode::finer(first.steps, 1.0);
+  const CompactResult second = compactor.at(steps);
+  EXPECT_GT(second.bytes, first.bytes);
+  encode::Compactor other(tube().grid, tube().source, options);
+  EXPECT_EQ(bytesOf(second.grid), bytesOf(other.at(steps).grid));
+  EXPECT_EQ(bytesOf(compactor.toGoal().grid), bytesOf(first.grid));
+}
+
 TEST(CompactGrid, OfNoEllipsoidsIsTheSame) {
   StoredGrid empty = tube().grid;
   for (auto& chunk : empty.field.chunks) chunk.ellipsoids = {};
