@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { test } from "node:test";
-import { bench, changeBy, openPage, rested, sceneOf } from "./support.mjs";
+import { becomes, bench, changeBy, openPage, rested, sceneOf } from "./support.mjs";
 
 const shared = bench();
 const kVisible = 0.05; // mean change of a picture, in 255ths
@@ -32,7 +32,7 @@ async function withThreePoints(t) {
 test("a click adds a point where it is", async (t) => {
   const page = await openPage(t, shared);
   assert.ok((await changeBy(page, () => clickInto(page, 0.5, 0.3))) > kVisible);
-  assert.equal(await points(page).count(), 3);
+  await becomes(() => points(page).count(), 3);
   const [low, [value, opacity], high] = opacityOf(page);
   assert.ok(value > low[0] && value < high[0]);
   assert.ok(opacity > 0.6 && opacity < 0.85, `${opacity}`);
@@ -54,16 +54,16 @@ test("Delete and a right click remove a point", async (t) => {
   const page = await withThreePoints(t);
   await point(page, 1).focus();
   await page.keyboard.press("Delete");
-  assert.equal(await points(page).count(), 2);
+  await becomes(() => points(page).count(), 2);
   await clickInto(page, 0.4, 0.4);
   await point(page, 1).click({ button: "right" });
-  assert.equal(await points(page).count(), 2);
+  await becomes(() => points(page).count(), 2);
 });
 
 test("a finger that taps adds a point, and one that scrolls does not", async (t) => {
   const page = await openPage(t, shared, { hasTouch: true, viewport: { width: 390, height: 700 } });
   await page.touchscreen.tap(...(await placeIn(page, 0.5, 0.4)));
-  assert.equal(await points(page).count(), 3);
+  await becomes(() => points(page).count(), 3);
   const devtools = await page.context().newCDPSession(page);
   const [x, y] = await placeIn(page, 0.3, 0.8);
   const touch = (type, touchPoints) => devtools.send("Input.dispatchTouchEvent", { type, touchPoints });
@@ -71,7 +71,7 @@ test("a finger that taps adds a point, and one that scrolls does not", async (t)
   for (let i = 1; i < 6; ++i) await touch("touchMove", [{ x, y: y - 20 * i }]);
   await touch("touchEnd", []);
   await rested(page);
-  assert.equal(await points(page).count(), 3);
+  await becomes(() => points(page).count(), 3);
   assert.ok((await page.evaluate(() => scrollY)) > 20);
 });
 
@@ -134,11 +134,11 @@ test("the histogram counts linearly or by logarithm", async (t) => {
 
 test("the axis of values can be zoomed by buttons and by the wheel", async (t) => {
   const page = await openPage(t, shared);
-  assert.equal(await points(page).count(), 2);
+  await becomes(() => points(page).count(), 2);
   await page.getByRole("button", { name: "Show fewer values" }).click();
-  assert.equal(await points(page).count(), 0);
+  await becomes(() => points(page).count(), 0);
   await page.getByRole("button", { name: "Show more values" }).click();
-  assert.equal(await points(page).count(), 2);
+  await becomes(() => points(page).count(), 2);
   await page.mouse.move(...(await placeIn(page, 0.5, 0.5)));
   await page.keyboard.down("Control");
   await page.mouse.wheel(0, -600);
@@ -150,13 +150,13 @@ test("buttons step through, add and remove points", async (t) => {
   const page = await openPage(t, shared);
   const group = page.getByRole("group", { name: /^Opacity point \d/ });
   await group.getByRole("button", { name: "Add" }).click();
-  assert.equal(await points(page).count(), 3);
+  await becomes(() => points(page).count(), 3);
   await page.getByRole("group", { name: "Opacity point 2 of 3" }).waitFor();
   await group.getByRole("button", { name: "Next" }).click();
   await page.getByRole("group", { name: "Opacity point 3 of 3" }).waitFor();
   await group.getByRole("button", { name: "Previous" }).click();
   await group.getByRole("button", { name: "Remove" }).click();
-  assert.equal(await points(page).count(), 2);
+  await becomes(() => points(page).count(), 2);
 });
 
 test("each color map and opacity curve changes the picture", async (t) => {
@@ -173,7 +173,7 @@ test("inverting the colors twice gives the first colors", async (t) => {
   assert.ok((await changeBy(page, invert)) > kVisible);
   await invert();
   await rested(page);
-  assert.ok(await page.getByRole("radio", { name: "Viridis" }).isChecked());
+  await becomes(() => page.getByRole("radio", { name: "Viridis" }).isChecked(), true);
 });
 
 test("the range moves all points", async (t) => {
@@ -192,17 +192,17 @@ test("colors can be reduced to a few points, moved, changed, added and removed",
   const page = await openPage(t, shared);
   await page.getByRole("button", { name: "Reduce to 9" }).click();
   const handles = page.getByRole("slider", { name: /^Color point/ });
-  assert.equal(await handles.count(), 9);
+  await becomes(() => handles.count(), 9);
   await handles.nth(4).focus();
   await page.keyboard.press("ArrowRight");
   const field = page.getByRole("group", { name: "Color point 5 of 9" }).getByLabel("Color");
   assert.ok((await changeBy(page, () => field.fill("#ff0000"))) > kVisible);
   assert.deepEqual(sceneOf(page).transfer.colors[4].slice(1), [1, 0, 0]);
   await page.getByRole("group", { name: /^Color point \d/ }).getByRole("button", { name: "Add" }).click();
-  assert.equal(await handles.count(), 10);
+  await becomes(() => handles.count(), 10);
   await handles.nth(5).focus();
   await page.keyboard.press("Delete");
-  assert.equal(await handles.count(), 9);
+  await becomes(() => handles.count(), 9);
 });
 
 test("changes are undone and done again", async (t) => {
@@ -210,11 +210,11 @@ test("changes are undone and done again", async (t) => {
   await page.getByRole("radio", { name: "Inferno" }).check();
   await rested(page);
   await page.keyboard.press("Control+z");
-  assert.ok(await page.getByRole("radio", { name: "Viridis" }).isChecked());
+  await becomes(() => page.getByRole("radio", { name: "Viridis" }).isChecked(), true);
   await page.getByRole("button", { name: "Redo" }).click();
-  assert.ok(await page.getByRole("radio", { name: "Inferno" }).isChecked());
+  await becomes(() => page.getByRole("radio", { name: "Inferno" }).isChecked(), true);
   await page.getByRole("button", { name: "Undo" }).click();
-  assert.ok(await page.getByRole("radio", { name: "Viridis" }).isChecked());
+  await becomes(() => page.getByRole("radio", { name: "Viridis" }).isChecked(), true);
 });
 
 const kPresets = [

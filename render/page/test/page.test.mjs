@@ -2,7 +2,7 @@
 // the server.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { bench, changeBy, differenceOf, litShare, openPage, pictureOf, rested, sceneOf, serve, unfold } from "./support.mjs";
+import { becomes, bench, changeBy, differenceOf, litShare, openPage, pictureOf, rested, sceneOf, serve, unfold } from "./support.mjs";
 
 const shared = bench();
 const kSections = ["Colors and opacity", "Rendering", "Cut", "Compare", "Statistics"];
@@ -41,7 +41,7 @@ test("the clip box cuts by numbers, by handles and by keys", async (t) => {
   const section = await unfold(page, "Cut");
   assert.ok((await changeBy(page, () => section.getByRole("radio", { name: "Clip box" }).check())) < kVisible, "the whole volume is inside");
   const handles = page.getByRole("slider", { name: /^Clip box/ });
-  assert.equal(await handles.count(), 6);
+  await becomes(() => handles.count(), 6);
   const [low, high] = sceneOf(page).clip;
   const middle = (low[1] + high[1]) / 2;
   const field = section.getByRole("group", { name: "Y" }).getByLabel("to");
@@ -250,7 +250,7 @@ test("help lists mouse, touch and keys, and is closed by Escape", async (t) => {
   const dialog = page.getByRole("dialog", { name: "Mouse, touch and keys" });
   await dialog.getByText("Wheel, or pinch").waitFor();
   await page.keyboard.press("Escape");
-  assert.equal(await dialog.count(), 0);
+  await becomes(() => dialog.count(), 0);
 });
 
 test("nothing moves by itself where motion is not wanted", async (t) => {

@@ -1,10 +1,12 @@
 // What the browser tests share: sample files, a server, a browser, and pictures as numbers.
-import { chromium } from "playwright-core";
+import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before } from "node:test";
+import { setTimeout } from "node:timers/promises";
+import { chromium } from "playwright-core";
 
 /** Flags for pages that draw by WebGL themselves. */
 export const kFlags = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"];
@@ -109,6 +111,12 @@ export async function openPage(t, shared, { hash = "", url = shared.server?.url,
 export async function rested(page) {
   await page.waitForTimeout(300); // until a change counts as at rest
   await page.locator('.picture[aria-busy="false"]').waitFor({ timeout: kStartMs });
+}
+
+/** Waits until `read` gives what is expected. The page draws its controls a moment after an event. */
+export async function becomes(read, expected) {
+  for (const end = Date.now() + kStartMs; Date.now() < end; await setTimeout(20)) if ((await read()) === expected) return;
+  assert.equal(await read(), expected);
 }
 
 /** The scene in the address. */
