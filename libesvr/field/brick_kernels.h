@@ -53,10 +53,8 @@ struct BrickKernels {
   /// Computes the moments. \param r  derivative of the loss by V at the brick's voxels
   void (*backward)(const BrickForm& f, const float corner[3], const KernelConstants<float>& k,
                    const float* r, const PairTape& tape, PairMoments& moments);
-  /// Have the same results as forward() and backward(), bit by bit, but read phi from the tape of
-  /// an earlier forward pass with the same shapes.
-  void (*addTape)(const PairTape& tape, float intensity, float* sum);
-  void (*projectTape)(const PairTape& tape, const float* r, PairProjection& projection);
+  /// Computes the two sums of PairProjection, which are among those of backward().
+  void (*project)(const PairTape& tape, const float* r, PairProjection& projection);
   /// Starts the residuals of a brick: r = -target.
   void (*start)(const float* target, float* r);
   /// Replaces r = V - target by clamp(V, low, high) - target.

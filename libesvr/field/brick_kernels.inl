@@ -357,26 +357,14 @@ void backward(const BrickForm& f, const float corner[3], const KernelConstants<f
   __builtin_memcpy(&moments, sums, sizeof sums);
 }
 
-/// Calls visit(phi, row) for every vector of a tape in its order; `row` points to its values in
-/// `values`.
-template <class Value, class Visit>
-inline void visitTape(const PairTape& tape, Value* values, Visit&& visit) {
-  const float* phi = tape.phi;
-  for (std::uint64_t rows = tape.rows; rows != 0; rows &= rows - 1, phi += kLanes) {
-    visit(load(phi), values + Row(rows).offset());
-  }
-}
-
-void addTape(const PairTape& tape, float intensity, float* sum) {
-  visitTape(tape, sum, [&](Vec phi, float* row) { store(row, load(row) + intensity * phi); });
-}
-
-void projectTape(const PairTape& tape, const float* r, PairProjection& projection) {
+void project(const PairTape& tape, const float* r, PairProjection& projection) {
   Vec rPhi{}, phi2{};
-  visitTape(tape, r, [&](Vec phi, const float* row) {
-    rPhi += load(row) * phi;
+  const float* in = tape.phi;
+  for (std::uint64_t rows = tape.rows; rows != 0; rows &= rows - 1, in += kLanes) {
+    const Vec phi = load(in);
+    rPhi += load(r + Row(rows).offset()) * phi;
     phi2 += phi * phi;
-  });
+  }
   projection = {sumLanes(rPhi), sumLanes(phi2)};
 }
 
@@ -449,8 +437,8 @@ void multiply(const double* a, const double* b, double* __restrict product, int 
 }  // namespace
 
 extern const BrickKernels kKernels;
-const BrickKernels kKernels{ESVR_KERNEL_NAME, add,   forward, backward,  addTape,
-                            projectTape,      start, finish,  sumMoments};
+const BrickKernels kKernels{ESVR_KERNEL_NAME, add,   forward, backward,
+                            project,          start, finish,  sumMoments};
 extern const AddPlaces kAddPlaces;
 const AddPlaces kAddPlaces = addPlaces;
 extern const SsimKernels kSsimKernels;

@@ -17,9 +17,6 @@ namespace esvr {
 namespace {
 
 constexpr std::size_t kBrickGrain = 4, kEllipsoidGrain = 256;
-/// Largest number of pairs whose tapes are kept between passes, which is about 200 MB. With more
-/// pairs, every pass computes the tapes again.
-constexpr std::size_t kMaxKeptPairs = 400'000;
 
 std::vector<Coord> asBricks(std::vector<Coord> corners) {
   for (Coord& c : corners) c = brickOf(c);
@@ -44,33 +41,6 @@ bool contains(const Box& box, Coord corner) {
          box.contains(corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1});
 }
 
-/// Tapes of one brick that are kept between passes without gaps. The memory is reused.
-class KeptTapes {
- public:
-  void keep(std::span<const PairTape> from) {
-    std::size_t floats = 0;
-    for (const PairTape& tape : from) floats += std::size_t(tape.floats);
-    if (floats > capacity_) {
-      capacity_ = floats + floats / kSpare;
-      phi_ = AlignedFloats(capacity_);
-    }
-    tapes_.assign(from.begin(), from.end());
-    float* at = phi_.get();
-    for (PairTape& tape : tapes_) {
-      std::copy_n(tape.phi, tape.floats, at);
-      tape.phi = at;
-      at += tape.floats;
-    }
-  }
-  [[nodiscard]] std::span<const PairTape> tapes() const { return tapes_; }
-
- private:
-  static constexpr std::size_t kSpare = 8;  ///< 1/8 more is allocated, since shapes change a little
-  std::vector<PairTape> tapes_;
-  AlignedFloats phi_;
-  std::size_t capacity_ = 0;
-};
-
 class CpuIntensityPasses final : public IntensityPasses {
  public:
   explicit CpuIntensityPasses(const IntensityTarget& target);
@@ -85,7 +55,7 @@ class CpuIntensityPasses final : public IntensityPasses {
   void setForms(std::span<const Number> intensities);
   /// Residuals of one brick; they are zero at voxels that a reader gets exactly.
   StoredError residualOf(std::size_t brick, float* sum, BrickMask* exact) const;
-  std::span<const PairTape> forward(std::size_t brick, PairTapes& scratch, float* sum);
+  void forward(std::size_t brick, PairTapes* tapes, float* sum) const;
   template <class Middle>
   void pass(bool backward, const Middle& middle);
   void sumPairs(float PairProjection::*value, std::vector<double>& out) const;
@@ -100,8 +70,6 @@ class CpuIntensityPasses final : public IntensityPasses {
   std::vector<Coord> corners_;        ///< corners of known bricks, then of others in reach
   std::vector<const float*> wanted_;  ///< source's values of known bricks; null: background
   EvaluatePlan plan_;
-  bool keeps_ = false, kept_ = false;  ///< whether tapes shall be kept, and are
-  std::vector<KeptTapes> tapes_;       ///< tapes of each brick
   std::vector<PairProjection> projections_;
   std::vector<StoredError> brickError_;
   std::vector<BrickMask> exact_;
@@ -128,9 +96,6 @@ void CpuIntensityPasses::setShapes(const Field& field) {
   corners_.clear();
   for (const Coord brick : index.bricks()) corners_.push_back(brick * kBrickSide);
   projections_.resize(plan_.pairs.pairCount());
-  keeps_ = plan_.pairs.pairCount() <= kMaxKeptPairs;
-  kept_ = false;
-  tapes_.resize(keeps_ ? corners_.size() : 0);
   brickError_.resize(corners_.size());
   exact_.assign(corners_.size(), {});
 }
@@ -141,51 +106,47 @@ void CpuIntensityPasses::setForms(std::span<const Number> intensities) {
     plan_.field.forms[i].intensity = float(intensities[i]);
 }
 
-/// Adds up a brick's ellipsoids and records their phi on the tapes.
-std::span<const PairTape> CpuIntensityPasses::forward(std::size_t brick, PairTapes& scratch,
-                                                      float* sum) {
+/// Adds up a brick's ellipsoids. \param tapes  records their phi; null if no backward pass follows
+void CpuIntensityPasses::forward(std::size_t brick, PairTapes* tapes, float* sum) const {
   const BrickKernels& kernels = brickKernels();
   const auto& [gathered, pairs] = plan_;
   const auto begin = pairs.brickBegin[brick], end = pairs.brickBegin[brick + 1];
-  if (kept_) {
-    const auto tapes = tapes_[brick].tapes();
-    for (auto pair = begin; pair != end; ++pair)
-      kernels.addTape(tapes[pair - begin], gathered.forms[pairs.ellipsoid[pair]].intensity, sum);
-    return tapes;
-  }
-  scratch.reserve(end - begin);
-  float* phi = scratch.phi.get();
+  if (tapes) tapes->reserve(end - begin);
+  float* phi = tapes ? tapes->phi.get() : nullptr;
   for (auto pair = begin; pair != end; ++pair) {
     const auto i = pairs.ellipsoid[pair];
     const auto corner = gathered.fromOrigin(i, corners_[brick]);
-    PairTape& tape = scratch.tapes[pair - begin];
+    if (!tapes) {
+      kernels.add(gathered.forms[i], corner.data(), gathered.kernel(i), sum);
+      continue;
+    }
+    PairTape& tape = tapes->tapes[pair - begin];
     tape.phi = phi;
     kernels.forward(gathered.forms[i], corner.data(), gathered.kernel(i), sum, tape);
     phi += tape.floats;
   }
-  if (keeps_) tapes_[brick].keep(scratch.tapes);
-  return scratch.tapes;
 }
 
 /// For every brick: a forward pass, middle(brick, sum), which turns the sum into the values that
-/// are projected on the ellipsoids, and, if wanted, a backward pass.
+/// are projected on the ellipsoids, and, if wanted, a backward pass. Tapes do not stay from one pass
+/// to the next: to compute them again takes no longer than to read them from memory.
 template <class Middle>
 void CpuIntensityPasses::pass(bool backward, const Middle& middle) {
   tbb::enumerable_thread_specific<PairTapes> scratches;
   parallelFor(tbb::blocked_range<std::size_t>(0, corners_.size(), kBrickGrain),
               [&](const auto& range) {
-                PairTapes& scratch = scratches.local();
+                PairTapes* const tapes = backward ? &scratches.local() : nullptr;
                 for (std::size_t b = range.begin(); b != range.end(); ++b) {
                   alignas(64) float sum[kBrickVoxels] = {};
-                  const auto tapes = forward(b, scratch, sum);
+                  forward(b, tapes, sum);
                   middle(b, sum);
                   if (!backward) continue;
                   const auto begin = plan_.pairs.brickBegin[b];
-                  for (std::size_t k = 0; k < tapes.size(); ++k)
-                    brickKernels().projectTape(tapes[k], sum, projections_[begin + k]);
+                  const auto end = plan_.pairs.brickBegin[b + 1];
+                  for (auto pair = begin; pair != end; ++pair)
+                    brickKernels().project(tapes->tapes[pair - begin], sum, projections_[pair]);
                 }
               });
-  kept_ = keeps_;
 }
 
 void CpuIntensityPasses::sumPairs(float PairProjection::*value, std::vector<double>& out) const {
