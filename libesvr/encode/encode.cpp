@@ -368,6 +368,7 @@ class Converter {
   }
 
   [[nodiscard]] Conversion asVoxels(VoxelLayer layer) const {
+    const BestSoFar completion;  // these voxels are the result
     Conversion conversion;
     conversion.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(layer));
     return conversion;
@@ -414,6 +415,7 @@ std::optional<Conversion> continueFrame(const Job& job) {
 /// \param previous  the grid of the previous frame; null: the grid stands alone
 StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
                             const VoxelMemory& memory) {
+  const CodedVoxels coded = grid.voxels ? grid.voxels->coded : CodedVoxels{};
   EsvrFile file, before;
   file.grids.push_back(std::move(grid));
   if (previous) before.grids.push_back(*previous);
@@ -423,7 +425,9 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
     return std::optional(
         std::move(decodeFrame(bytes, "the stored grid", {.memory = memory}, frame).grids.front()));
   });
-  return read ? std::move(*read) : std::move(file.grids.front());
+  StoredGrid made = read ? std::move(*read) : std::move(file.grids.front());
+  if (made.voxels) made.voxels->coded = coded;
+  return made;
 }
 
 /// Checks the decoded grid against the bound.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/remembered.h"
 #include "encode/ellipsoids.h"
 #include "encode/tuning.h"
 #include "encode/voxels.h"
@@ -38,7 +39,8 @@ template <class Of>
 double sumOfBricks(const SparseVolume& volume, const Of& of) {
   std::vector<double> parts(volume.brickCount());
   parallelFor(std::size_t{0}, parts.size(), [&](std::size_t b) {
-    for (const float value : volume.brickValues(b)) parts[b] += double(of(value));
+    Remembered remembered(of);
+    for (const float value : volume.brickValues(b)) parts[b] += double(remembered(value));
   });
   return std::accumulate(parts.begin(), parts.end(), 0.0);
 }
@@ -72,7 +74,8 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
       tone_(tone),
       range_(activeRange(input.source)),
       halfs_(input.descriptor.valueType == ValueType::kHalf),
-      box_{.box = options.fit.box, .peak = options.fit.peak} {
+      box_{.box = options.fit.box,
+           .peak = options.fit.peak ? *options.fit.peak : peakOf(input.source)} {
   range_.expand(input.source.background);
   if (!seesPictures(input, options)) return;
   pictures_.emplace(input.source, options.fit.box);
@@ -86,8 +89,9 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
 void Judge::toValues(SparseVolume& volume) const {
   if (tone_.isOn())
     parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-      for (float& value : volume.brickValues(b))
-        value = std::clamp(tone_.value(value), range_.min, range_.max);
+      Remembered valueOf(
+          [&](float tone) { return std::clamp(tone_.value(tone), range_.min, range_.max); });
+      for (float& value : volume.brickValues(b)) value = valueOf(value);
     });
   if (halfs_) roundToHalfs(volume);
 }

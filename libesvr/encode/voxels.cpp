@@ -114,8 +114,8 @@ double complexityOf(const SparseVolume& volume, double bound) {
 }
 
 /// Bytes of a layer's section without its palette, which a sample has as a whole.
-double bytesOfCodes(const VoxelLayer& layer) {
-  return double(format::putVoxels(layer).size()) - double(layer.palette.size() * sizeof(float));
+double bytesOfCodes(VoxelLayer& layer) {
+  return double(format::keepCoded(layer)) - double(layer.palette.size() * sizeof(float));
 }
 
 /// Bytes that a grid of voxels adds to a file besides those of its voxels, with padding.
@@ -127,7 +127,7 @@ std::uint64_t bytesBeside(const Job& job) {
 
 /// The bytes of exact voxels of a volume, from those of a sample.
 std::uint64_t exactBytesOf(const SparseVolume& sample, const SparseVolume& whole) {
-  const VoxelLayer layer = smallestExactLayer(sample);
+  VoxelLayer layer = smallestExactLayer(sample);
   const double bound = spanOf(whole).length() * 0x1p-14;
   const bool isWhole = sample.brickCount() == whole.brickCount() || !(bound > 0.0);
   const double share = isWhole ? double(sample.brickCount()) / double(whole.brickCount())
@@ -295,7 +295,7 @@ double VoxelSearch::shareOfBytes(const SparseVolume& volume, double bound) const
   return complexityOf(volume, bound) / complexityOf(job_.input.source, bound);
 }
 
-std::uint64_t VoxelSearch::bytesOf(const SparseVolume& volume, const VoxelLayer& layer,
+std::uint64_t VoxelSearch::bytesOf(const SparseVolume& volume, VoxelLayer& layer,
                                    double bound) const {
   if (job_.options.previous)
     return bytesInFrame(makeStoredVoxels(job_.input.descriptor, job_.input.source, layer),
@@ -388,7 +388,7 @@ void VoxelSearch::tryForPsnr() {
 bool VoxelSearch::exactIsBest() {
   if (voxelActivity(job_) != Activity::kExact || job_.options.previous || isToned(job_))
     return false;
-  const VoxelLayer exact = smallestExactLayer(tryOn_);
+  VoxelLayer exact = smallestExactLayer(tryOn_);
   if (exact.form != VoxelForm::kPalette) return false;
   exact_ = exactBytes();
   VoxelLayer bare = exact;
@@ -541,8 +541,8 @@ std::optional<Candidate> VoxelSearch::estimate() {
 
 VoxelCandidate VoxelSearch::candidateOf(Tried tried) const {
   VoxelCandidate made;
-  made.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(tried.layer));
   const BestSoFar completion;
+  made.grid = makeStoredVoxels(job_.input.descriptor, job_.input.source, std::move(tried.layer));
   made.bytes = bytesInFrame(made.grid, job_.options.previous);
   made.psnr = tried.psnr;
   return made;

@@ -91,7 +91,7 @@ class VoxelSearch {
   [[nodiscard]] double psnrOn(const SparseVolume& volume, const VoxelLayer& layer) const;
   [[nodiscard]] Tried tried(const SparseVolume& volume, const Setting& setting) const;
   [[nodiscard]] double shareOfBytes(const SparseVolume& volume, double bound) const;
-  [[nodiscard]] std::uint64_t bytesOf(const SparseVolume& volume, const VoxelLayer& layer,
+  [[nodiscard]] std::uint64_t bytesOf(const SparseVolume& volume, VoxelLayer& layer,
                                       double bound) const;
   [[nodiscard]] std::optional<Tried> coarsest(const SparseVolume& volume, double psnr,
                                               const Setting& first, int mostTrials,

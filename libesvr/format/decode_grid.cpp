@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/remembered.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid.h"
@@ -214,7 +215,8 @@ void clip(const Box& box, const VoxelRule& rule, SparseVolume& volume) {
 /// Turns the tones of voxels into values, within the range of the grid.
 void applyTone(const VoxelRule& rule, SparseVolume& volume) {
   parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
-    for (float& value : volume.brickValues(b)) value = rule.settled(value);
+    Remembered settled([&](float tone) { return rule.settled(tone); });
+    for (float& value : volume.brickValues(b)) value = settled(value);
   });
 }
 

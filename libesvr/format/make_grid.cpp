@@ -14,6 +14,7 @@
 #include "field/evaluate.h"
 #include "field/voxel_rule.h"
 #include "format/grid_rule.h"
+#include "format/voxel_section.h"
 
 namespace esvr {
 
@@ -223,6 +224,7 @@ StoredGrid makeStoredVoxels(const GridDescriptor& descriptor, const SparseVolume
   StoredGrid grid = describe(descriptor, source);
   grid.field.background = source.background;
   grid.voxels = std::move(layer);
+  format::keepCoded(*grid.voxels);
   return grid;
 }
 

@@ -194,7 +194,9 @@ void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
   if (!allFinite(layer)) in.fail("a voxel is not finite");
 }
 
-std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
+namespace {
+
+std::vector<std::byte> code(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
   codec::VoxelModel model = codec::chooseModel(layer);
   auto stream = encodeStreams(layer, model, bits);
@@ -211,6 +213,36 @@ std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   out.putAll(stream);
   out.padTo(std::max<std::uint64_t>(out.size(), bytesForBricks(layer.bricks.size())));
   return out.take();
+}
+
+/// The checksum of all members of a layer that its section depends on.
+std::uint64_t checksumOf(const VoxelLayer& layer) {
+  ByteWriter head;
+  putVoxelHead(head, layer);
+  RunningChecksum sum;
+  sum.add(head.take());
+  const auto add = [&](const auto& all) {
+    sum.add(std::as_bytes(std::span(all.data(), all.size())));
+  };
+  add(layer.bricks);
+  add(layer.codes);
+  add(layer.active);
+  add(layer.vacant);
+  return sum.value();
+}
+
+}  // namespace
+
+std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
+  const CodedVoxels& coded = layer.coded;
+  const bool isCoded = coded.section && coded.checksum == checksumOf(layer);
+  return isCoded ? *coded.section : code(layer);
+}
+
+std::uint64_t keepCoded(VoxelLayer& layer) {
+  auto section = std::make_shared<const std::vector<std::byte>>(putVoxels(layer));
+  layer.coded = {checksumOf(layer), std::move(section)};
+  return layer.coded.section->size();
 }
 
 bool takeMore(const VoxelLayer& layer, std::uint64_t bytes) {

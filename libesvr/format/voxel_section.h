@@ -12,7 +12,10 @@
 
 namespace esvr::format {
 
+/// The section of a layer. It is coded, unless the layer has kept it.
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
+/// Codes a layer and keeps its section in it. \return the bytes of the section
+std::uint64_t keepCoded(VoxelLayer& layer);
 
 /// True if the section takes more than a number of bytes. Coding stops where that is known.
 [[nodiscard]] bool takeMore(const VoxelLayer& layer, std::uint64_t bytes);

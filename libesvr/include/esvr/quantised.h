@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -124,6 +125,15 @@ enum class VoxelForm {
   kPalette = 3  ///< palette entry n
 };
 
+/// The section of a file that holds a voxel layer, kept so that the layer is coded once. It counts only
+/// while the layer is the same, which its checksum shows, and layers are compared without it.
+struct CodedVoxels {
+  std::uint64_t checksum = 0;                             ///< of the layer that was coded
+  std::shared_ptr<const std::vector<std::byte>> section;  ///< null: not coded yet
+
+  friend bool operator==(const CodedVoxels&, const CodedVoxels&) { return true; }
+};
+
 struct VoxelLayer {
   VoxelForm form = VoxelForm::kFloat;
   double divisor = 1.0;            ///< divisor of kQuantised
@@ -134,6 +144,7 @@ struct VoxelLayer {
   VoxelArray<std::int32_t> codes;  ///< kBrickVoxels per brick; vacant voxels have the background's
   std::vector<BrickMask> active;
   std::vector<BrickMask> vacant;  ///< inactive voxels that are exactly the background
+  CodedVoxels coded;
 
   friend bool operator==(const VoxelLayer&, const VoxelLayer&) = default;
 };
