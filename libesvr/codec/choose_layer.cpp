@@ -206,9 +206,13 @@ double largestMagnitude(const SparseVolume& volume) {
   return parallelReduce(
       Range(0, volume.brickCount()), 0.0f,
       [&](const Range& bricks, float largest) {
+        constexpr std::size_t kLanes = 8;  // of a SIMD vector
+        float lanes[kLanes] = {};
         for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
-          for (const float v : volume.brickValues(b)) largest = larger(largest, std::abs(v));
-        return largest;
+          for (std::size_t v = 0; v < kBrickVoxels; v += kLanes)
+            for (std::size_t k = 0; k < kLanes; ++k)
+              lanes[k] = larger(lanes[k], std::abs(volume.brickValues(b)[v + k]));
+        return std::max(largest, *std::max_element(lanes, lanes + kLanes));
       },
       larger);
 }

@@ -15,8 +15,8 @@ namespace codec {
 namespace {
 
 constexpr double kLargestCode = 0x1p30;
-constexpr int kFloatMantissa = 23, kHalfMantissa = 10, kHalfLowest = -14, kHalfHighest = 15;
-constexpr std::int32_t kHalfOne = 1 << kHalfMantissa, kHalfBits = 0x7fff;
+constexpr int kFloatMantissa = 23, kHalfMantissa = 10;
+constexpr std::int32_t kHalfBits = 0x7fff;
 
 /// The value of a code of a lattice. The code next to the largest float may stand for a larger number, which no
 /// float holds.
@@ -57,15 +57,12 @@ float halfAt(std::int32_t n) {
   return std::copysign(moved * 0x1p112f, n < 0 ? -1.0f : 1.0f);
 }
 std::int32_t orderOfHalf(float v) {
-  const double magnitude = std::abs(double(v));
-  int exponent = magnitude > 0.0 ? std::ilogb(magnitude) : kHalfLowest;
-  exponent = std::clamp(exponent, kHalfLowest, kHalfHighest);
-  const double mantissa = std::floor(std::ldexp(magnitude, kHalfMantissa - exponent));
-  const auto steps = std::int32_t(std::min(mantissa, 2.0 * kHalfOne - 1.0));
-  const bool subnormal = steps < kHalfOne;
-  const std::int32_t bits =
-      subnormal ? steps : ((exponent + kHalfHighest) << kHalfMantissa) + steps - kHalfOne;
-  return orderOf(bits, std::signbit(v));
+  constexpr std::int32_t kOffset = 112,
+                         kLargest = 0x7bff;  // difference of the exponents' offsets, and 65504
+  const float magnitude = std::abs(v);
+  if (magnitude < 0x1p-14f) return orderOf(std::int32_t(magnitude * 0x1p24f), std::signbit(v));
+  const auto bits = std::bit_cast<std::int32_t>(magnitude) >> (kFloatMantissa - kHalfMantissa);
+  return orderOf(std::min(bits - (kOffset << kHalfMantissa), kLargest), std::signbit(v));
 }
 
 float nearestHalf(float v) {

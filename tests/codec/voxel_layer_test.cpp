@@ -67,6 +67,18 @@ TEST(NearestHalf, IsTheNearestOfAllHalfs) {
   }
 }
 
+TEST(OrderOfHalf, CutsOffWhatIsBetweenTwoHalfs) {
+  for (std::int32_t n = 0; n < 0x7c00; ++n) {
+    const auto half = float(halfByDefinition(n));
+    const float above = std::nextafter(half, 1e9f), below = std::nextafter(half, 0.0f);
+    ASSERT_EQ(codec::orderOfHalf(half), n);
+    ASSERT_EQ(codec::orderOfHalf(-half), -1 - n);
+    ASSERT_EQ(codec::orderOfHalf(above), n);
+    ASSERT_EQ(codec::orderOfHalf(below), std::max(n - 1, 0));
+  }
+  EXPECT_EQ(codec::orderOfHalf(1e30f), 0x7bff);
+}
+
 TEST(NearestHalf, StaysWithinTheHalfsAndOnItsSideOfZero) {
   const float infinity = std::numeric_limits<float>::infinity();
   for (const float v : {65519.0f, 65520.0f, 1e30f, infinity}) {

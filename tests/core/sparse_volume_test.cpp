@@ -178,6 +178,22 @@ TEST(ActiveRange, SeesActiveVoxelsOnly) {
   EXPECT_EQ(range.max, 1.0f);
 }
 
+TEST(ActiveRange, LeavesOutWhatIsNotFinite) {
+  BrickInput brick = brickWith({}, {0, 0, 0});
+  brick.active.setAll();
+  for (int v = 0; v < kBrickVoxels; ++v) brick.values[std::size_t(v)] = float(v);
+  const float infinity = std::numeric_limits<float>::infinity();
+  brick.values[0] = std::numeric_limits<float>::quiet_NaN();
+  brick.values[70] = -infinity, brick.values[511] = infinity;
+  for (const std::uint64_t word :
+       {~0ull, ~1ull}) {  // the words of the mask, and one that is not all ones
+    brick.active.words[4] = word;
+    const auto range = activeRange(makeVolume({brick}, 0.0f));
+    EXPECT_EQ(range.min, 1.0f);
+    EXPECT_EQ(range.max, 510.0f);
+  }
+}
+
 TEST(FindBrick, FindsEveryBrickAndNoOther) {
   const auto volume = makeVolume(
       {brickWith({0, 0, 0}, {}), brickWith({0, 0, 16}, {}), brickWith({8, 0, 0}, {})}, 0.0f);

@@ -45,6 +45,26 @@ TEST(VoxelSection, ComesBackIntegerByInteger) {
   for (const VoxelLayer& layer : someLayers()) EXPECT_EQ(voxelsOf(putVoxels(layer), "v"), layer);
 }
 
+TEST(VoxelSection, ThatIsKeptCountsWhileTheLayerIsTheSame) {
+  for (const VoxelLayer& layer : someLayers()) {
+    VoxelLayer kept = layer;
+    EXPECT_EQ(format::keepCoded(kept), putVoxels(layer).size());
+    EXPECT_EQ(putVoxels(kept), putVoxels(layer));
+    const auto expectCodedAnew = [&](const char* what) {
+      VoxelLayer changed = kept;
+      changed.coded = {};
+      EXPECT_EQ(putVoxels(kept), putVoxels(changed)) << what;
+      EXPECT_NE(putVoxels(kept), putVoxels(layer)) << what;
+    };
+    kept.codes.back() ^= 1;
+    expectCodedAnew("a code");
+    kept.codes.back() ^= 1, kept.divisor *= 2.0;
+    expectCodedAnew("the divisor");
+    kept.divisor /= 2.0, kept.background = -kept.background - 1.0f;
+    expectCodedAnew("the background");
+  }
+}
+
 TEST(VoxelSection, OfNoBrickComesBack) {
   EXPECT_EQ(voxelsOf(putVoxels(VoxelLayer{}), "v"), VoxelLayer{});
 }
