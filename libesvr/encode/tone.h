@@ -2,6 +2,7 @@
 /// What a conversion is judged by, and the tone curve that it codes values with.
 
 #include <optional>
+#include <span>
 
 #include "encode/ellipsoids.h"
 #include "esvr/tone.h"
@@ -44,6 +45,7 @@ class Judge {
 
  private:
   void toValues(SparseVolume& volume) const;
+  void toValues(std::span<const float> tones, float factor, std::span<float> values) const;
 
   const SparseVolume& values_;
   const VoxelLayer* filled_;  ///< ConvertOptions::filled

@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "encode/tone.h"
 #include "encode/volumes.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
@@ -161,6 +162,30 @@ TEST(Tone, KeepsAMaskWithTheMass) {
   const SparseVolume decoded = decodeGrid(made.grid);
   EXPECT_EQ(activeVoxelCount(decoded), activeVoxelCount(volume));
   EXPECT_EQ(compareVolumes(volume, decoded).iou, 1.0);
+}
+
+/// Values over 30 octaves, of both signs, by tones around the scale and far beyond it. The float32 tones have relative
+/// errors of 2^-24 (1 + u / s) in their values, and a judge adds 5e-7.
+TEST(Judge, SeesTheValuesOfTones) {
+  const SparseVolume source = test::volumeOf({}, 2, -1.0f, [](Coord v) {
+    return std::ldexp(1.0f + 0.1f * float(v.y), v.x * 2 - 15) * (v.z % 3 == 0 ? -1.0f : 1.0f);
+  });
+  GridDescriptor descriptor;
+  descriptor.gridClass = GridClass::kFogVolume;
+  for (const float scale : {1e-4f, 1.0f, 1e6f}) {
+    const encode::Judge judge({descriptor, source}, {}, ToneCurve{scale});
+    SparseVolume one = source;
+    for (std::size_t b = 0; b < source.brickCount(); ++b) {
+      // The masses of single voxels: the others are 0.
+      for (const std::size_t v : {0u, 77u, 300u, 511u}) {
+        std::ranges::fill(one.values, 0.0f);
+        const float value = source.brickValues(b)[v];
+        one.brickValues(b)[v] = ToneCurve{scale}.of(value);
+        const double rounding = (1.0 + std::abs(double(one.brickValues(b)[v])) / scale) * 0x1p-24;
+        EXPECT_NEAR(judge.massOf(one), value, (5e-7 + 2.0 * rounding) * std::abs(value));
+      }
+    }
+  }
 }
 
 TEST(Tone, KeepsTheTotalMass) {

@@ -56,9 +56,13 @@ TEST(VoxelSection, ThatIsKeptCountsWhileTheLayerIsTheSame) {
       EXPECT_EQ(putVoxels(kept), putVoxels(changed)) << what;
       EXPECT_NE(putVoxels(kept), putVoxels(layer)) << what;
     };
-    kept.codes.back() ^= 1;
+    int active = 0;
+    while (!kept.active[0].test(active)) ++active;
+    std::int32_t& code = kept.codes[std::size_t(active)];
+    const std::int32_t before = code;
+    code += before > 0 ? -1 : 1;
     expectCodedAnew("a code");
-    kept.codes.back() ^= 1, kept.divisor *= 2.0;
+    code = before, kept.divisor *= 2.0;
     expectCodedAnew("the divisor");
     kept.divisor /= 2.0, kept.background = -kept.background - 1.0f;
     expectCodedAnew("the background");
