@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 
 #include "core/brick_index.h"
 #include "core/parallel.h"
@@ -39,6 +41,20 @@ void clearVoxels(const BrickMask& mask, float* values) {
 bool contains(const Box& box, Coord corner) {
   return box.contains(corner) &&
          box.contains(corner + Coord{kBrickSide - 1, kBrickSide - 1, kBrickSide - 1});
+}
+
+/// The errors of a brick, summed in the lanes of SIMD vectors.
+StoredError sumOf(const float (&missed)[kBrickVoxels]) {
+  constexpr int kLanes = 8;
+  double squares[kLanes] = {};
+  float largest[kLanes] = {};
+  for (int v = 0; v < kBrickVoxels; v += kLanes)
+    for (int k = 0; k < kLanes; ++k) {
+      squares[k] += double(missed[v + k]) * double(missed[v + k]);
+      largest[k] = std::max(largest[k], std::abs(missed[v + k]));
+    }
+  return {std::accumulate(squares, squares + kLanes, 0.0),
+          *std::max_element(largest, largest + kLanes)};
 }
 
 class CpuIntensityPasses final : public IntensityPasses {
@@ -161,23 +177,27 @@ void CpuIntensityPasses::sumPairs(float PairProjection::*value, std::vector<doub
 }
 
 StoredError CpuIntensityPasses::residualOf(std::size_t brick, float* sum, BrickMask* exact) const {
-  const float* const wanted = brick < wanted_.size() ? wanted_[brick] : nullptr;
-  const Coord corner = corners_[brick];
-  const bool inBox = contains(box_, corner);
-  StoredError error;
-  for (int v = 0; v < kBrickVoxels; ++v) {
-    const float target = wanted ? wanted[v] : source_.background;
-    const float value = background_ + sum[v];
-    const double missed = double(stored_(value)) - double(target);
-    sum[v] = missed == 0.0 ? 0.0f : value - target;
-    if (missed == 0.0) {
-      if (exact) exact->set(v);
-    } else if (inBox || box_.contains(corner + voxelLocal(v))) {
-      error.squares += missed * missed;
-      error.largest = std::max(error.largest, std::abs(missed));
+  alignas(64) float missed[kBrickVoxels], background[kBrickVoxels];
+  const float* target = brick < wanted_.size() ? wanted_[brick] : nullptr;
+  if (!target) target = std::fill_n(background, kBrickVoxels, source_.background) - kBrickVoxels;
+  const auto compare = [&](const VoxelRule& rule) {
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const float value = background_ + sum[v];
+      missed[v] = rule(value) - target[v];
+      sum[v] = missed[v] == 0.0f ? 0.0f : value - target[v];
     }
-  }
-  return error;
+  };
+  VoxelRule plain = stored_;
+  plain.tone = {};  // without a curve, the loop becomes vector instructions
+  stored_.tone.isOn() ? compare(stored_) : compare(plain);
+  if (exact)
+    for (int v = 0; v < kBrickVoxels; ++v)
+      exact->words[std::size_t(v / 64)] |= std::uint64_t(missed[v] == 0.0f) << (v % 64);
+  const Coord corner = corners_[brick];
+  if (!contains(box_, corner))
+    for (int v = 0; v < kBrickVoxels; ++v)
+      if (!box_.contains(corner + voxelLocal(v))) missed[v] = 0.0f;
+  return sumOf(missed);
 }
 
 StoredError CpuIntensityPasses::total() const {
