@@ -57,8 +57,8 @@ float halfAt(std::int32_t n) {
   return std::copysign(moved * 0x1p112f, n < 0 ? -1.0f : 1.0f);
 }
 std::int32_t orderOfHalf(float v) {
-  constexpr std::int32_t kOffset = 112,
-                         kLargest = 0x7bff;  // difference of the exponents' offsets, and 65504
+  constexpr std::int32_t kOffset = 112;      // difference of the exponents' offsets
+  constexpr std::int32_t kLargest = 0x7bff;  // 65504
   const float magnitude = std::abs(v);
   if (magnitude < 0x1p-14f) return orderOf(std::int32_t(magnitude * 0x1p24f), std::signbit(v));
   const auto bits = std::bit_cast<std::int32_t>(magnitude) >> (kFloatMantissa - kHalfMantissa);

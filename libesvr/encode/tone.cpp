@@ -52,8 +52,7 @@ double sumOf(std::span<const float> values) {
 /// sinh(x) with a relative error below 5e-7, for |x| below 89. The loops that call it become vector instructions.
 float quickSinh(float x) {
   constexpr float kLog2e = 1.44269504f, kLn2High = 0.693145752f, kLn2Low = 1.42860677e-6f;
-  constexpr float kRound =
-      12582912.0f;  // 1.5 * 2^23: adding it rounds to an integer in the low bits
+  constexpr float kRound = 0x1.8p23f;  // adding it rounds to an integer in the low bits
   const float magnitude = std::min(std::abs(x), 89.0f), square = x * x;
   // Below 1, the series; above, the exponential function of the magnitude, of which half is 2^(n - 1) p.
   const float series =
@@ -161,7 +160,8 @@ double Judge::massOf(const SparseVolume& tones, double factor) const {
 }
 
 double Judge::massFactor(double wanted, const SparseVolume& decoded) const {
-  // A factor farther from 1 would change what is seen more than the missing mass does.
+  // The slope is that between two factors, since values that are clamped do not grow. A factor farther from 1 would
+  // change what is seen more than the missing mass does.
   constexpr int kSteps = 5;
   constexpr double kMostChange = 0.05, kEnough = 1e-5, kProbe = 1e-3;
   double factor = 1.0, mass = massOf(decoded);
