@@ -60,7 +60,7 @@ InactiveValues InactiveCounter::lostIn(const SparseVolume& volume) const {
   std::optional<EmptySigns> signs;
   if (volume.brickCount() > 0 && volume.background > 0.0f) signs.emplace(volume);
   const bool isFilled = signs && signs->agree();
-  if (!isFilled) lost.add(negated_);
+  if (!signs) lost.add(negated_);
   // A place without active voxels lies in one region of the empty space.
   for (const Place& place : negatedPlaces_)
     if (!isFilled || !signs->isInside(brickOf(place.corner))) lost.add(place.values);

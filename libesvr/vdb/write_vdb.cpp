@@ -285,9 +285,9 @@ void setNonFinite(const SparseVolume& volume, Tree& tree) {
     });
 }
 
-/// Gives the inactive voxels in the leaves of a level set, and then its inactive tiles, the background with the sign of
-/// their side. A flood fill of the leaves would take the signs from the active voxels before them, and where a band
-/// has a hole within a leaf, all space could become the inside.
+/// Gives the inactive voxels of a level set the background with the sign of their side: those in leaves the sign that the
+/// volume has, and tiles that of the empty space, if it has one. A flood fill of the leaves would take the signs from the
+/// active voxels before them, and where a band has a hole within a leaf, all space could become the inside.
 template <class Tree>
 void setSigns(const SparseVolume& volume, Tree& tree) {
   openvdb::tree::ValueAccessor<Tree> accessor(tree);
@@ -299,7 +299,7 @@ void setSigns(const SparseVolume& volume, Tree& tree) {
         leaf->setValueOnly(openvdb::Index(v), -tree.background());
   }
   constexpr openvdb::Index kFirstOfTiles = 1;  // level in the tree
-  openvdb::tools::signedFloodFill(tree, true, 1, kFirstOfTiles);
+  if (EmptySigns(volume).agree()) openvdb::tools::signedFloodFill(tree, true, 1, kFirstOfTiles);
 }
 
 template <class Tree>
@@ -316,7 +316,7 @@ GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, Le
   const auto grid = gridInMemory<Tree>(NumberVoxels{volume}, background);
   Tree& tree = grid->tree();
   // The flood fill overwrites active tiles, so it runs before there are any.
-  if (levelSet && background > 0 && EmptySigns(volume).agree()) setSigns(volume, tree);
+  if (levelSet && background > 0) setSigns(volume, tree);
   if (isSigned) setNonFinite(source.volume, tree);
   if (options.constantTiles) {
     openvdb::tools::prune(tree);
