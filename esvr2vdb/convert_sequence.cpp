@@ -190,8 +190,8 @@ class SequenceDecoding {
   void throwWhatIsAmiss() const {
     const auto written = std::ranges::count_if(done_, &Done::isWritten);
     if (cancel_.cancelled())
-      throw RuntimeFailure("interrupted; " + std::to_string(written) + " of " +
-                           cli::counted(frames_.size(), "frame") + " complete");
+      throw RuntimeFailure("interrupted; " +
+                           cli::completeOf(std::uint64_t(written), frames_.size(), "frame"));
     std::vector<cli::FrameNumber> failed;
     for (std::size_t i = 0; i < frames_.size(); ++i)
       if (done_[i].failure) failed.push_back(frames_[i].number);

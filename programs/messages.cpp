@@ -157,8 +157,10 @@ std::string decibels(double value) {
   return std::isinf(value) ? "exact" : formatted("%.2f", value);
 }
 std::string shortNumber(double value) { return formatted("%.4g", value); }
-std::string counted(std::uint64_t number, const std::string& thing) {
-  return std::to_string(number) + " " + thing + (number == 1 ? "" : "s");
+
+std::string completeOf(std::uint64_t done, std::uint64_t all, const std::string& thing) {
+  return std::to_string(done) + " of " + counted(all, thing) + (done == 1 ? " is" : " are") +
+         " complete";
 }
 
 std::string seconds(double value) { return formatted("%.1f", value); }

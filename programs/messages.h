@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/counted.h"
 #include "esvr/grid.h"
 #include "esvr/volume.h"
 
@@ -77,8 +78,10 @@ class Table {
 [[nodiscard]] std::string decibels(double value);
 /// A number with four significant digits.
 [[nodiscard]] std::string shortNumber(double value);
-/// A number of things with their noun, for example "1 voxel" and "2 voxels". \param thing  one of them
-[[nodiscard]] std::string counted(std::uint64_t number, const std::string& thing);
+using esvr::counted;
+/// What an interrupted run leaves, for example "1 of 3 frames is complete". \param thing  one of them
+[[nodiscard]] std::string completeOf(std::uint64_t done, std::uint64_t all,
+                                     const std::string& thing);
 /// A time with one decimal, for example "12.3", so that a column is aligned.
 [[nodiscard]] std::string seconds(double value);
 

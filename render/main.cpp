@@ -269,8 +269,7 @@ class Frames {
   /// \throws RuntimeFailure  it leaves something
   void tellInterruption(std::size_t all) const {
     if (video_ || complete_ == 0) return;
-    throw RuntimeFailure("interrupted; " + std::to_string(complete_) + " of " +
-                         std::to_string(all) + " pictures are complete");
+    throw RuntimeFailure("interrupted; " + cli::completeOf(complete_, all, "picture"));
   }
 
  private:

@@ -6,6 +6,7 @@
 #include <unordered_map>
 
 #include "esvr/error.h"
+#include "programs/messages.h"
 #include "programs/names.h"
 #include "programs/option_values.h"
 #include "programs/sequence.h"
@@ -79,9 +80,9 @@ void widen(const FrameGrid& grid, GridRange& range) {
 
 Error interruption(const SequenceRecord& record) {
   const auto written = std::ranges::count_if(record.frames, isWritten);
-  return RuntimeFailure("interrupted; " + std::to_string(written) + " of " +
-                        cli::counted(record.frames.size(), "frame") +
-                        " complete, and --resume continues with the others");
+  return RuntimeFailure("interrupted; " +
+                        cli::completeOf(std::uint64_t(written), record.frames.size(), "frame") +
+                        ", and --resume continues with the others");
 }
 
 }  // namespace

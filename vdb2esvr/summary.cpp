@@ -87,8 +87,9 @@ void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostr
 /// Says that the goal was measured by what is seen, and which tone curve serves it, or by the surface.
 void printMeasure(const ConvertedGrid& grid, std::ostream& out) {
   if (const auto bound = grid.conversion.surfaceBound)
-    out << cli::printable(grid.uniqueName) << ": judged by its surface; every value is within "
-        << cli::shortNumber(*bound) << ", and no voxel changes its side\n";
+    out << cli::printable(grid.uniqueName)
+        << ": judged by its surface; every active value is within " << cli::shortNumber(*bound)
+        << ", and no active voxel changes its side\n";
   const ToneCurve tone = grid.stored().tone;
   if (!grid.conversion.byPictures && !tone.isOn()) return;
   out << cli::printable(grid.uniqueName) << ": ";

@@ -619,22 +619,28 @@ Conversion convertNear(const ConvertInput& given, const ConvertOptions& options,
   return conversion;
 }
 
-/// Whether a level set is judged by its surface. A narrow band is not: its values are distances to the surface
-/// of a few voxels, so that their PSNR says the same.
-bool isJudgedBySurface(const ConvertInput& input, const ConvertOptions& options) {
+/// Whether a level set may be judged by its surface. The presets of wide bands are, too (isUsualBand).
+bool mayBeJudgedBySurface(const ConvertInput& input, const ConvertOptions& options) {
   const bool isOpen = options.measure == Measure::kAuto &&
                       options.representation != Representation::kEllipsoids &&
                       options.storage.form == Storage::kCompact;
-  return isOpen && input.descriptor.gridClass == GridClass::kLevelSet && !options.fit.narrowBand &&
+  return isOpen && input.descriptor.gridClass == GridClass::kLevelSet &&
          (std::holds_alternative<PresetGoal>(options.goal) ||
-          std::holds_alternative<SizeGoal>(options.goal));
+          (std::holds_alternative<SizeGoal>(options.goal) && !options.fit.narrowBand));
+}
+
+/// True for a narrow band of a few voxels, whose values are distances to the surface, so that their PSNR says how far
+/// it moves. The peak of a wider band, such as one with markers of 10,000 in empty space, says nothing of it.
+bool isUsualBand(const ConvertInput& input, const ConvertOptions& options, double change) {
+  constexpr double kWidest = 16.0;  // half width, voxels: 40 dB are errors of 0.16 voxels
+  return options.fit.narrowBand && input.source.background <= kWidest * change;
 }
 
 /// Converts a level set that is judged by its surface to voxels.
-/// \return nothing if it has no surface, or if no voxels fit into the size
+/// \return nothing if it has no surface or is a narrow band of the usual width, or if no voxels fit into the size
 std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptions options) try {
   const auto change = changeAcrossSurface(input.source);
-  if (!change) return std::nullopt;
+  if (!change || isUsualBand(input, options, *change)) return std::nullopt;
   std::optional<double> bound;
   if (std::holds_alternative<PresetGoal>(options.goal)) {
     bound = presetSurfaceBound(options.fit.preset) * *change;
@@ -716,7 +722,7 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
   if (own.previous && own.previous->farBackground) own.previous = nullptr;
   own.fit.cancel = CancelScope::token();
   own.fit.narrowBand = isNarrowBand(input.descriptor, input.source);
-  if (isJudgedBySurface(input, own))
+  if (mayBeJudgedBySurface(input, own))
     if (auto made = convertSurface(input, own)) return std::move(*made);
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
   own.representation = possibleRepresentation(input, own);

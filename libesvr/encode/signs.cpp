@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
 #include "esvr/error.h"
@@ -269,7 +270,7 @@ void requireSigns(const ConvertInput& input, const SparseVolume& decoded) {
   const std::string grid = "grid '" + shownName(input.descriptor.name) + "': ";
   if (errors.first)
     throw RuntimeFailure(
-        grid + std::to_string(errors.voxels) + (errors.voxels == 1 ? " voxel is" : " voxels are") +
+        grid + counted(errors.voxels, "voxel") + (errors.voxels == 1 ? " is" : " are") +
         " on the wrong side of the surface, for example voxel " + toString(*errors.first));
   if (!EmptySigns(decoded).agree())
     throw RuntimeFailure(grid + "the surface of the decoded voxels has holes");

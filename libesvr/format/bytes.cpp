@@ -1,4 +1,5 @@
 #include "format/bytes.h"
+#include "core/counted.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -19,8 +20,8 @@ namespace {
 
 std::vector<std::byte> ByteSource::read(std::uint64_t offset, std::uint64_t n) const {
   if (offset > size() || n > size() - offset)
-    throw BadInput(name_ + ": truncated: " + std::to_string(n) + " bytes at byte " +
-                   std::to_string(offset) + " do not lie in a file of " + std::to_string(size()));
+    throw BadInput(name_ + ": truncated: no room for " + counted(n, "byte") + " at byte " +
+                   std::to_string(offset) + " of a file of " + std::to_string(size()));
   std::vector<std::byte> bytes(n);
   fill(offset, bytes);
   bytesRead_ += n;

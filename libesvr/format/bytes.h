@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/counted.h"
 #include "esvr/error.h"
 
 struct XXH64_state_s;
@@ -108,7 +109,7 @@ class ByteReader {
 
   /// Refuses bytes that have not been read.
   void finish() const {
-    if (left() != 0) fail(std::to_string(left()) + " bytes too many");
+    if (left() != 0) fail(counted(left(), "byte") + " too many");
   }
 
   /// Refuses unread bytes that are not zero.
@@ -123,7 +124,7 @@ class ByteReader {
 
  private:
   std::span<const std::byte> take(std::size_t n) {
-    if (n > left()) fail("ends within a value of " + std::to_string(n) + " bytes");
+    if (n > left()) fail("ends within a value of " + counted(n, "byte"));
     const auto taken = bytes_.subspan(at_, n);
     at_ += n;
     return taken;

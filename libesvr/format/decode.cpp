@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "core/counted.h"
 #include "esvr/error.h"
 #include "format/activity_sections.h"
 #include "format/ellipsoid_sections.h"
@@ -125,7 +126,7 @@ class GridDecoder {
     const auto content = sections_.get(id(SectionKind::kChunks));
     ByteReader in(content, sections_.place(id(SectionKind::kChunks)));
     if (content.size() != count * kChunkRecordBytes)
-      in.fail("not a table of " + std::to_string(count) + " chunks");
+      in.fail("not a table of " + counted(count, "chunk"));
     std::vector<ChunkRecord> records;
     for (std::uint32_t c = 0; c < count; ++c) records.push_back(getChunk(in));
     return records;

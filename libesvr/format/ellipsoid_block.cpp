@@ -12,6 +12,7 @@
 #include "codec/brick_coder.h"
 #include "codec/lattice.h"
 #include "codec/range_coder.h"
+#include "core/counted.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "esvr/container.h"
@@ -324,8 +325,8 @@ void padForEllipsoids(ByteWriter& out, std::size_t count) {
 void checkCount(const ByteReader& in, std::uint64_t stored, std::uint64_t count,
                 std::uint64_t bytes) {
   if (stored != count || count / kMaxEllipsoidsPerByte > bytes)
-    in.fail(std::to_string(bytes) + " bytes of content with " + std::to_string(stored) +
-            " ellipsoids for " + std::to_string(count));
+    in.fail(counted(bytes, "byte") + " of content with " + counted(stored, "ellipsoid") + " for " +
+            std::to_string(count));
 }
 
 BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/counted.h"
 #include "core/geometry.h"
 #include "esvr/error.h"
 
@@ -36,8 +37,8 @@ void getPlanes(std::span<const std::byte> content, std::uint64_t count, std::spa
                const std::string& where) {
   const std::uint64_t perEllipsoid = planes.size() * sizeof(float);
   if (content.size() % perEllipsoid != 0 || content.size() / perEllipsoid != count)
-    throw BadInput(where + ": " + std::to_string(content.size()) + " bytes of content for " +
-                   std::to_string(count) + " ellipsoids");
+    throw BadInput(where + ": " + counted(content.size(), "byte") + " of content for " +
+                   counted(count, "ellipsoid"));
   for (auto& plane : planes) {
     plane.resize(count);
     if (count != 0) std::memcpy(plane.data(), content.data(), count * sizeof(float));

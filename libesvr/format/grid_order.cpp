@@ -1,3 +1,4 @@
+#include "core/counted.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -32,9 +33,9 @@ class OthersInOrder {
   void requireComponents(const StoredVector& vector) const {
     const std::size_t grids = file_.grids.size();
     if (vector.first != taken_ || grids - taken_ < kComponents)
-      throw RuntimeFailure(
-          "grid '" + shownName(vector.name) + "' has no three components of its own from " +
-          std::to_string(vector.first) + " on among " + std::to_string(grids) + " grids");
+      throw RuntimeFailure("grid '" + shownName(vector.name) +
+                           "' has no three components of its own from " +
+                           std::to_string(vector.first) + " on among " + counted(grids, "grid"));
   }
 
   const EsvrFile& file_;
@@ -52,7 +53,7 @@ std::vector<GridOfFile> gridsInOrder(const EsvrFile& file) {
     if (others.taken() + c != place)
       throw RuntimeFailure("grid '" + shownName(file.carried[c].name) + "' cannot have place " +
                            std::to_string(place) + " among " +
-                           std::to_string(file.grids.size() + file.carried.size()) + " grids");
+                           counted(file.grids.size() + file.carried.size(), "grid"));
     order.push_back({true, c});
   }
   while (!others.done()) order.push_back(others.take());

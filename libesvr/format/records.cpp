@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/counted.h"
 #include "core/geometry.h"
 #include "esvr/error.h"
 
@@ -394,7 +395,7 @@ std::vector<LayerError> getLayerErrors(std::span<const std::byte> content, std::
                                        const std::string& where) {
   ByteReader in(content, where);
   if (content.size() != layers * kRecordBytes)
-    in.fail("not a table of " + std::to_string(layers) + " layers");
+    in.fail("not a table of " + counted(layers, "layer"));
   std::vector<LayerError> errors(layers);
   for (LayerError& error : errors) {
     error.psnrBox = in.get<float>();

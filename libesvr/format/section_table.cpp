@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "codec/byte_coder.h"
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 
@@ -140,7 +141,7 @@ class TableCheck {
   void checkPlace(std::size_t i) const {
     const auto& e = table_.entries[i];
     if (e.offset > table_.fileBytes || e.storedBytes > table_.fileBytes - e.offset)
-      fail(i, std::to_string(e.storedBytes) + " bytes do not lie in the file");
+      fail(i, "no room for its " + counted(e.storedBytes, "byte") + " in the file");
     if (e.offset % kAlignment != 0) fail(i, "not aligned");
   }
 
@@ -160,7 +161,7 @@ class TableCheck {
     if (e.codec != Codec::kRaw && isCarried != isOfCarried)
       fail(i, "codec '" + nameOf(e.codec) + "' is not that of " + nameOf(e.id.kind));
     if (!plausibleSizes(e.codec, e.storedBytes, e.rawBytes))
-      fail(i, std::to_string(e.storedBytes) + " bytes cannot hold " + std::to_string(e.rawBytes));
+      fail(i, counted(e.storedBytes, "byte") + " cannot hold " + std::to_string(e.rawBytes));
   }
 
   void checkOverlap() const {
@@ -284,7 +285,7 @@ void checkSize(const ByteSource& source, const Header& h) {
     throw BadInput(source.name() + ": not complete: the program that wrote it was interrupted");
   const bool shorter = source.size() < h.fileBytes;
   throw BadInput(source.name() + (shorter ? ": truncated: " : ": has bytes after its end: ") +
-                 std::to_string(source.size()) + " bytes where its header says " +
+                 counted(source.size(), "byte") + " where its header says " +
                  std::to_string(h.fileBytes));
 }
 

@@ -7,6 +7,7 @@
 
 #include "codec/brick_coder.h"
 #include "codec/voxel_coder.h"
+#include "core/counted.h"
 #include "esvr/error.h"
 
 namespace esvr::format {
@@ -80,8 +81,7 @@ struct BrickCount {
 BrickCount getBrickCount(ByteReader& in, std::uint64_t bytes) {
   BrickCount count{in.get<std::uint64_t>(), 0};
   if (count.bricks > maxBricksIn(bytes))
-    in.fail(std::to_string(bytes) + " bytes of content for " + std::to_string(count.bricks) +
-            " bricks");
+    in.fail(counted(bytes, "byte") + " of content for " + counted(count.bricks, "brick"));
   count.bits = in.get<std::uint8_t>();
   if (count.bits > kMaxBrickBits) in.fail("bricks of voxels lie too far apart");
   return count;

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/counted.h"
 #include "esvr/device.h"
 #include "esvr/error.h"
 #include "esvr/volume.h"
@@ -59,7 +60,7 @@ InactiveValues InactiveCounter::lostIn(const SparseVolume& volume) const {
   std::optional<EmptySigns> signs;
   if (volume.brickCount() > 0 && volume.background > 0.0f) signs.emplace(volume);
   const bool isFilled = signs && signs->agree();
-  if (!isFilled) lost.add(negated_);
+  if (!signs) lost.add(negated_);
   // A place without active voxels lies in one region of the empty space.
   for (const Place& place : negatedPlaces_)
     if (!isFilled || !signs->isInside(brickOf(place.corner))) lost.add(place.values);
@@ -76,7 +77,7 @@ float narrowBackground(double background) {
 
 void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
   const std::string what =
-      "it has " + std::to_string(bricks) + " bricks of 8^3 voxels, active tiles included, and";
+      "it has " + counted(bricks, "brick") + " of 8^3 voxels, active tiles included, and";
   const double count = double(bricks), volumes = double(options.volumes);
   const bool isInFile = options.memory.isInFile(bricks * std::uint64_t(kValueBytes));
   const double values = isInFile ? 0.0 : kValueBytes;
@@ -88,11 +89,11 @@ void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
   if (tally.count == 0) return;
   if (nonFinite == NonFinite::kKeep)
-    throw CannotConvert(
-        std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
-        " finite but too large for float; the first is at " + toString(tally.first));
+    throw CannotConvert(counted(tally.count, "voxel") + (tally.count == 1 ? " is" : " are") +
+                        " finite but too large for float; the first is at " +
+                        toString(tally.first));
   if (nonFinite != NonFinite::kRefuse) return;
-  throw NotFinite(std::to_string(tally.count) + (tally.count == 1 ? " voxel is" : " voxels are") +
+  throw NotFinite(counted(tally.count, "voxel") + (tally.count == 1 ? " is" : " are") +
                   " NaN, infinite or too large for float; the first is at " +
                   toString(tally.first));
 }

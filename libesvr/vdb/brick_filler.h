@@ -84,7 +84,7 @@ class InactiveCounter {
   void leaf(std::span<const double, kBrickVoxels> values, Coord corner);
 
   /// The values that a writer does not restore from the volume: all that are not the background,
-  /// but for the background with a negative sign in a level set where a flood fill restores it.
+  /// but for the background with a negative sign in leaves of a level set, and where a flood fill restores it.
   [[nodiscard]] InactiveValues lostIn(const SparseVolume& volume) const;
 
  private:

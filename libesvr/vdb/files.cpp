@@ -9,6 +9,7 @@
 #include <streambuf>
 #include <system_error>
 
+#include "core/counted.h"
 #include "esvr/error.h"
 
 namespace esvr::vdb {
@@ -120,7 +121,7 @@ std::string InputFile::endText() const {
 
 void InputFile::need(std::uint64_t bytes) const {
   if (position_ > end_ || bytes > remaining())
-    throw BadInput("is truncated or damaged: " + std::to_string(bytes) + " bytes expected at " +
+    throw BadInput("is truncated or damaged: " + counted(bytes, "byte") + " expected at " +
                    std::to_string(position_) + ", " + endText());
 }
 

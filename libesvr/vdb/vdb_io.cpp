@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/atomic_file.h"
+#include "core/counted.h"
 #include "core/read_input.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -82,7 +83,7 @@ std::size_t placeIn(const std::filesystem::path& path, const std::string& name) 
 void requireGrid(std::size_t place, std::size_t grids) {
   if (place < grids) return;
   throw BadInput("has no grid number " + std::to_string(place + 1) + ", only " +
-                 std::to_string(grids) + (grids == 1 ? " grid" : " grids"));
+                 counted(grids, "grid"));
 }
 
 VectorGrid joinedComponents(

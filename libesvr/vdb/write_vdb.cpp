@@ -285,6 +285,23 @@ void setNonFinite(const SparseVolume& volume, Tree& tree) {
     });
 }
 
+/// Gives the inactive voxels of a level set the background with the sign of their side: those in leaves the sign that the
+/// volume has, and tiles that of the empty space, if it has one. A flood fill of the leaves would take the signs from the
+/// active voxels before them, and where a band has a hole within a leaf, all space could become the inside.
+template <class Tree>
+void setSigns(const SparseVolume& volume, Tree& tree) {
+  openvdb::tree::ValueAccessor<Tree> accessor(tree);
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    const Coord at = volume.brickCorner(b);
+    auto* const leaf = accessor.probeLeaf(openvdb::Coord(at.x, at.y, at.z));
+    for (int v = 0; leaf && v < kBrickVoxels; ++v)
+      if (!volume.active[b].test(v) && volume.brickValues(b)[std::size_t(v)] < 0.0f)
+        leaf->setValueOnly(openvdb::Index(v), -tree.background());
+  }
+  constexpr openvdb::Index kFirstOfTiles = 1;  // level in the tree
+  if (EmptySigns(volume).agree()) openvdb::tools::signedFloodFill(tree, true, 1, kFirstOfTiles);
+}
+
 template <class Tree>
 GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, LeafVoxels voxels) {
   const auto background = typename Tree::ValueType(source.descriptor.background);
@@ -299,8 +316,7 @@ GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, Le
   const auto grid = gridInMemory<Tree>(NumberVoxels{volume}, background);
   Tree& tree = grid->tree();
   // The flood fill overwrites active tiles, so it runs before there are any.
-  if (levelSet && background > 0 && EmptySigns(volume).agree())
-    openvdb::tools::signedFloodFill(tree);
+  if (levelSet && background > 0) setSigns(volume, tree);
   if (isSigned) setNonFinite(source.volume, tree);
   if (options.constantTiles) {
     openvdb::tools::prune(tree);

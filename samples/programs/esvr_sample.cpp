@@ -10,6 +10,7 @@
 #include "programs/command_line.h"
 #include "programs/files.h"
 #include "programs/frames.h"
+#include "programs/messages.h"
 #include "programs/run_main.h"
 #include "programs/workers.h"
 #include "sample_output.h"
@@ -118,8 +119,9 @@ int run(int argc, char** argv) {
     }
   } catch (const Cancelled&) {
     if (f == first) throw;
-    throw RuntimeFailure("interrupted; " + std::to_string(f - first) + " of " +
-                         std::to_string(last - first + 1) + " frames are complete");
+    throw RuntimeFailure("interrupted; " + cli::completeOf(std::uint64_t(f - first),
+                                                           std::uint64_t(last - first + 1),
+                                                           "frame"));
   }
   return 0;
 }

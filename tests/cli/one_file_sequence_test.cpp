@@ -265,7 +265,7 @@ TEST_F(SlowLastFrame, isConvertedAfterTheProgramWasKilled) {
 
 TEST_F(SlowLastFrame, leavesTheCompleteGroupsWhereItIsInterrupted) {
   EXPECT_THAT(runInterrupted(VDB2ESVR, wordsTo("out.esvr"), kWithoutTheLast),
-              Fails(1, "interrupted; 16 of 17 frames complete, and --resume"));
+              Fails(1, "interrupted; 16 of 17 frames are complete, and --resume"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial"));
   makeQuick();
   EXPECT_THAT(succeeded(resumed()).err, HasSubstr("\"kept\""));

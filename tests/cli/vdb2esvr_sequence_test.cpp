@@ -234,7 +234,7 @@ TEST_F(SequenceFiles, thatAreCompleteStayAfterAnInterruption) {
   Words arguments = joined(
       {at("in.####.vdb"), at("out.####.esvr"), "--progress", "json", "--device", "cpu"}, inOrder);
   EXPECT_THAT(runInterrupted(VDB2ESVR, arguments, "\"frames_done\":2"),
-              Fails(1, "interrupted; 2 of 3 frames complete, and --resume"));
+              Fails(1, "interrupted; 2 of 3 frames are complete, and --resume"));
   EXPECT_THAT(outputs(), ElementsAre("out.0001.esvr", "out.0002.esvr"));
 
   writeInput(at("in.0003.vdb"), {{.voxels = softBall({})}});

@@ -239,9 +239,9 @@ TEST(WithSigns, BelongsToAllOfTheEllipsoids) {
 
 // ---- Level sets that are no narrow bands
 
-/// A ball whose distances are truncated outside, with markers far from it, in a box of active voxels and with a
-/// background of 0, as simulations store obstacles.
-SparseVolume obstacle(float marker) {
+/// A ball whose distances are truncated outside, with markers far from it, in a box of active voxels and by default
+/// with a background of 0, as simulations store obstacles.
+SparseVolume obstacle(float marker, float background = 0.0f) {
   std::vector<BrickInput> bricks;
   for (int b = 0; b < 6 * 6 * 6; ++b) {
     BrickInput brick{Coord{b / 36, b / 6 % 6, b % 6} * kBrickSide, {}, {}};
@@ -253,7 +253,7 @@ SparseVolume obstacle(float marker) {
     }
     bricks.push_back(brick);
   }
-  return makeVolume(std::move(bricks), 0.0f);
+  return makeVolume(std::move(bricks), background);
 }
 
 TEST(Surface, ChangesByTheSizeOfAVoxel) {
@@ -278,6 +278,19 @@ TEST(Surface, IsKeptBesideMarkersOfAnySize) {
     if (marker < 1e30f) bytes = std::max(bytes, double(bytesAdded(made.grid)));
   }
   EXPECT_LT(bytes, 0.1 * 4.0 * 48 * 48 * 48);
+}
+
+TEST(Surface, OfABandIsJudgedWhereThePsnrSaysNothingOfIt) {
+  const SparseVolume usual = test::levelSetVolume();
+  EXPECT_FALSE(bandOf(usual, PresetGoal{}).surfaceBound);
+  for (const float marker : {1e4f, 1e30f}) {
+    const SparseVolume volume = obstacle(marker, marker);
+    ASSERT_TRUE(isNarrowBand(levelSet(volume), volume));
+    const Conversion made = convertVolume({levelSet(volume), volume}, {.goal = PresetGoal{}});
+    ASSERT_TRUE(made.surfaceBound);
+    EXPECT_LE(largestDifference(volume, decodeGrid(made.grid)), *made.surfaceBound);
+    EXPECT_EQ(compareSigns(volume, decodeGrid(made.grid)).voxels, 0u);
+  }
 }
 
 TEST(Surface, OfASizeKeepsItsSigns) {

@@ -262,6 +262,8 @@ TEST(Counted, HasThePluralUnlessThereIsOne) {
   EXPECT_EQ(counted(0, "voxel"), "0 voxels");
   EXPECT_EQ(counted(1, "voxel"), "1 voxel");
   EXPECT_EQ(counted(2, "active voxel"), "2 active voxels");
+  EXPECT_EQ(completeOf(1, 3, "frame"), "1 of 3 frames is complete");
+  EXPECT_EQ(completeOf(0, 1, "frame"), "0 of 1 frame are complete");
 }
 
 TEST(RequireRange, refusesWhatLiesOutsideAndNaN) {

@@ -159,10 +159,13 @@ def test_grids_of_an_esvr_file_are_decoded_and_carried_ones_are_read(tmp_path, r
         esvr.PackedGrid.from_file(source, kinds[0], frame=1)
 
 
-def test_a_level_set_is_negative_inside(tmp_path):
+@pytest.mark.parametrize("radius", [25, 7])  # with bricks inside of which no voxel is active, and without
+@pytest.mark.parametrize("only_the_band", [True, False])
+def test_a_level_set_is_negative_inside(tmp_path, radius, only_the_band):
     x, y, z = np.mgrid[0:64, 0:64, 0:64] - 31.5
-    distance = (np.sqrt(x * x + y * y + z * z) - 25).astype(np.float32)
-    volume = esvr.Volume.from_numpy(np.clip(distance, -3, 3), background=3, level_set=True)
+    distance = (np.sqrt(x * x + y * y + z * z) - radius).astype(np.float32)
+    volume = esvr.Volume.from_numpy(np.clip(distance, -3, 3), background=3, level_set=True,
+                                    active=np.abs(distance) < 3 if only_the_band else None)
     path = tmp_path / "ball.vdb"
     volume.save(path)
     grid = esvr.PackedGrid.from_file(path)

@@ -143,6 +143,18 @@ TEST(MeshDistance, ToNoSurfaceIsInfinite) {
   EXPECT_EQ(meshDistance(none, none).voxels, 0.0);
 }
 
+/// A file without loss keeps the signs of inactive voxels, also where no active voxels separate the sides.
+TEST_F(LevelSetFile, WithAHoleInLeavesKeepsAllSigns) {
+  const auto grid = sphereOf({.radius = 10.0});
+  openvdb::CoordBBox hole({5, -2, -2}, {13, 2, 2});
+  for (auto voxel = hole.begin(); voxel; ++voxel)
+    grid->tree().setValueOff(*voxel, grid->background());
+  const VolumeGrid source = readBack(grid);
+  ASSERT_TRUE(isNarrowBand(source.descriptor, source.volume));
+  EXPECT_EQ(source.inactive.count(), 0u);
+  EXPECT_EQ(signErrors(*grid, *throughAFile(converted(source, LosslessGoal{}))), 0u);
+}
+
 TEST_F(LevelSetFile, WithAHoleIsWrittenWithoutAFloodFill) {
   const auto grid = sphereOf({});
   grid->tree().root().touchLeaf(openvdb::Coord(0, 0, 20))->setValuesOff();

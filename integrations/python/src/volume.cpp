@@ -26,6 +26,7 @@ struct Dense {
   Coord side;
   Box box;
   bool keepsNonFinite = false;
+  bool isLevelSet = false;  ///< inactive voxels have the background with the sign of their value
 
   [[nodiscard]] std::size_t placeOf(Coord voxel) const {
     const Coord v = voxel - box.min;
@@ -142,8 +143,9 @@ BrickInput brickOfArray(const Dense& dense, Coord corner, float background, floa
     if (!dense.box.contains(voxel)) continue;
     const std::size_t place = dense.placeOf(voxel);
     if (dense.masked != nullptr && dense.masked[place]) continue;
-    if (dense.active != nullptr && !dense.active[place]) continue;
     const float value = dense.values[place];
+    if (dense.isLevelSet && value < 0.0f) brick.values[i] = -std::abs(background);
+    if (dense.active != nullptr && !dense.active[place]) continue;
     if (!std::isfinite(value)) {
       if (!dense.keepsNonFinite)
         throw BadInput("the value of voxel " + toString(voxel) +
@@ -234,7 +236,8 @@ Volume fromNumpy(const py::object& array, const ArrayOptions& options) {
                     .active = options.active ? options.active->data() : nullptr,
                     .side = side,
                     .box = {first, first + (side - Coord{1, 1, 1})},
-                    .keepsNonFinite = options.nonFinite == NonFinite::kKeep};
+                    .keepsNonFinite = options.nonFinite == NonFinite::kKeep,
+                    .isLevelSet = options.gridClass == GridClass::kLevelSet};
   const py::gil_scoped_release release;
   auto grid = std::make_shared<VolumeGrid>();
   grid->descriptor.name = options.name;

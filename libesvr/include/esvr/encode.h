@@ -104,9 +104,9 @@ using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, 
 enum class Measure {
   /// What is seen of a volume that is looked through (isLookedThrough, metrics.h; background 0): the PSNR
   /// of its transmittance for T = 0.5, unless the PSNR over the active voxels limits it: it may be 4 dB
-  /// lower with a tone curve, and must be 2 dB higher without one. A level set that is no narrow band is
-  /// judged by its surface, since its values far from it, such as markers of empty space, may be of any size:
-  /// it is stored as voxels, with presetSurfaceBound() for a preset. For any other volume, as kValues.
+  /// lower with a tone curve, and must be 2 dB higher without one. A level set that is no narrow band, or
+  /// for a preset one of more than 16 voxels, is judged by its surface, since its values far from it, such as
+  /// markers of empty space, may be of any size: it is stored as voxels, with presetSurfaceBound() for a preset. For any other volume, as kValues.
   kAuto,
   kValues  ///< the PSNR of values
 };

@@ -174,7 +174,8 @@ struct GridTraits {
 // they make of them: OpenVDB's tools skip them, Blender draws those in leaves with active voxels.
 
 /// Counts values and remembers enough of them to compare two grids. In a level set, the background
-/// with a negative sign is not counted where a writer restores it (EmptySigns::agree).
+/// with a negative sign is not counted where a writer restores it: beside active voxels, and elsewhere if the signs of the
+/// empty space agree (EmptySigns::agree).
 class InactiveValues {
  public:
   /// Adds the value of a voxel.
