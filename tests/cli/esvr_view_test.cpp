@@ -13,7 +13,7 @@
 #include "esvr/device.h"
 #include "programs/page.h"
 #include "render/view/view_client.h"
-#include "support/search_path.h"
+#include "support/files.h"
 
 namespace esvr::test {
 namespace {

@@ -21,7 +21,7 @@
 #include <vector>
 
 #include "core/cuda/runtime.h"
-#include "support/on_device.h"
+#include "support/machine.h"
 
 namespace esvr::cuda {
 namespace {

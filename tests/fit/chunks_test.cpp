@@ -29,9 +29,9 @@
 #include "fit/chunks/fit_in_chunks.h"
 #include "fit/chunks/part.h"
 #include "fit/cpu/cpu_pass.h"
-#include "random_ellipsoids.h"
-#include "support/on_device.h"
-#include "volumes.h"
+#include "fit/gradient_scene.h"
+#include "fit/volumes.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {

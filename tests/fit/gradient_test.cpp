@@ -13,8 +13,8 @@
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid.h"
 #include "fit/gradient.h"
-#include "gradient_cases.h"
-#include "random_ellipsoids.h"
+#include "fit/gradient_cases.h"
+#include "fit/gradient_scene.h"
 
 namespace esvr {
 namespace {

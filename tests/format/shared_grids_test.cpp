@@ -10,18 +10,17 @@
 #include <cstring>
 #include <limits>
 
-#include "../fit/volumes.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "fit/volumes.h"
 #include "format/bytes.h"
-#include "format/crafted_file.h"
 #include "format/frame_table.h"
 #include "format/predicted_sections.h"
 #include "format/sample_files.h"
 #include "format/section_writer.h"
+#include "support/files.h"
 #include "support/messages.h"
-#include "support/temporary_folder.h"
 
 namespace esvr::test {
 namespace {

@@ -21,12 +21,11 @@
 #include <utility>
 #include <vector>
 
-#include "../fit/volumes.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "metrics/dense_reference.h"
+#include "fit/volumes.h"
 #include "metrics/volumes.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {
@@ -335,7 +334,7 @@ TEST(Psnr, followsItsFormula) {
 constexpr int kSide = 32, kFirst = 10, kLast = 21;
 constexpr double kTolerance = 1e-10;
 
-/// The same function as in make_ssim_fixture.py.
+/// The same function as in make_metrics_fixture.py.
 double hashed(std::uint64_t index) {
   return double((index * 2654435761u % (std::uint64_t{1} << 32)) >> 8) / (1 << 24);
 }

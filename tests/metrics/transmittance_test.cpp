@@ -12,13 +12,13 @@
 #include <limits>
 #include <vector>
 
-#include "../field/random_field.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/metrics.h"
+#include "field/random_field.h"
 #include "metrics/transmittance.h"
 #include "metrics/volumes.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {

@@ -19,7 +19,7 @@
 #include "esvr/error.h"
 #include "programs/pictures.h"
 #include "programs/video_file.h"
-#include "support/search_path.h"
+#include "support/files.h"
 
 namespace esvr::report {
 namespace {

@@ -17,7 +17,7 @@
 #include "render/reference_picture.h"
 #include "render/render_cells.h"
 #include "render/scenes.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 namespace {

@@ -22,7 +22,7 @@
 #include <utility>
 
 #include "esvr/error.h"
-#include "support/trials.h"
+#include "support/machine.h"
 #include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"
 
@@ -62,7 +62,7 @@ TEST_F(Input, IsRefusedIfItIsText) {
 
 TEST_F(Input, IsRefusedIfItIsTooOld) {
   test::save(directory_ / "old.vdb", {test::smallGrid()});
-  auto bytes = test::bytesOf(directory_ / "old.vdb");
+  auto bytes = test::bytesIn(directory_ / "old.vdb");
   bytes[8] = std::byte{221};  // the version follows the magic number
   test::writeBytes(directory_ / "old.vdb", bytes);
   expectRefused(directory_ / "old.vdb", "version 221");
@@ -71,7 +71,7 @@ TEST_F(Input, IsRefusedIfItIsTooOld) {
 TEST_F(Input, OfANewerFormatVersionIsTried) {
   // OpenVDB 13 writes version 225 into every file, and nothing else changed for float grids.
   test::save(directory_ / "new.vdb", {test::smallGrid()});
-  auto bytes = test::bytesOf(directory_ / "new.vdb");
+  auto bytes = test::bytesIn(directory_ / "new.vdb");
   bytes[8] = std::byte{225};
   test::writeBytes(directory_ / "new.vdb", bytes);
   EXPECT_EQ(activeVoxelCount(readGrid(directory_ / "new.vdb", "density").volume), 3u);
@@ -109,7 +109,7 @@ openvdb::GridPtrVec gridsOfAllKinds() {
 
 /// Makes "words" a grid of strings, which OpenVDB cannot read, in a written file.
 void unknownWords(const std::filesystem::path& path) {
-  auto bytes = test::bytesOf(path);
+  auto bytes = test::bytesIn(path);
   const std::string_view known = "Tree_ptidx32_5_4_3", unknown = "Tree_strings_5_4_3";
   const auto is = [](std::byte byte, char letter) { return char(byte) == letter; };
   const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(), is);
@@ -301,7 +301,7 @@ TEST_F(Carried, GridHasTheVoxelsOfTheFile) {
 
 TEST_F(Carried, GridOfATypeThatOpenVdbDoesNotKnowComesBack) {
   test::save(in(), {test::smallGrid()});
-  auto bytes = test::bytesOf(in());
+  auto bytes = test::bytesIn(in());
   const std::string known = "Tree_float_5_4_3", odd = "Tree_quux_5_4_33";
   const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(),
                               [](std::byte b, char c) { return b == std::byte(c); });
@@ -356,7 +356,7 @@ TEST_F(Carried, GridsCannotBeWrittenToNanoVdb) {
 TEST_F(Carried, GridsOfAnotherVersionOfTheFormatAreRefused) {
   test::save(in(), {test::smallGrid(), test::emptyGrid("Tree_ptdataidx32_5_4_3", "p")});
   EXPECT_THAT(inspectVdb(in()).grids[1].whyNotCarried, IsEmpty());
-  auto bytes = test::bytesOf(in());
+  auto bytes = test::bytesIn(in());
   bytes[kVersionAt] = std::byte(223);
   test::writeBytes(in(), bytes);
   const auto grids = inspectVdb(in()).grids;
@@ -374,7 +374,7 @@ TEST_F(Carried, GridsOfAnotherVersionOfTheFormatAreRefused) {
 TEST_F(Carried, GridsOfTheFormatOfOpenVdb13AreCarriedByEarlierVersionsToo) {
   test::save(in(), {test::smallGrid(), test::emptyGrid("Tree_ptdataidx32_5_4_3", "p")});
   const auto here = carryAll(in());
-  auto bytes = test::bytesOf(in());
+  auto bytes = test::bytesIn(in());
   bytes[kVersionAt] = std::byte(225);
   test::writeBytes(in(), bytes);
   EXPECT_EQ(test::withoutVersion(carryAll(in())), test::withoutVersion(here));
@@ -415,7 +415,7 @@ class Damage : public testing::Test {
     grid->setTransform(openvdb::math::Transform::createFrustumTransform(
         {openvdb::Vec3d(0), openvdb::Vec3d(100)}, 0.5, 1.0, 0.1));
     test::saveCompressed(path(), {grid}, compression);
-    return test::bytesOf(path());
+    return test::bytesIn(path());
   }
 
   test::TemporaryFolder directory_;
@@ -469,7 +469,7 @@ TEST_F(Damage, AnyByteMayBeWrong) {
 TEST_F(Damage, AnyByteOfALeafMayBeWrong) {
   for (const auto compression : kEveryCodec) {
     test::saveCompressed(path(), {test::smallGrid()}, compression);
-    const Bytes whole = test::bytesOf(path());
+    const Bytes whole = test::bytesIn(path());
     // The last leaf's mask, packing, chunk size, chunk header and the first of its values.
     const std::size_t leafBytes = std::min<std::size_t>(whole.size(), compression ? 110 : 2200);
     for (std::size_t i = whole.size() - leafBytes; i < whole.size() - leafBytes + 110; ++i)
@@ -484,7 +484,7 @@ TEST_F(Damage, AnyByteOfALeafMayBeWrong) {
 // A leaf's mask is in the file twice, the second time before its values.
 TEST_F(Damage, ALeafWithoutTheActiveVoxelsOfItsTreeIsRefused) {
   test::saveCompressed(path(), {test::smallGrid()}, COMPRESS_NONE);
-  Bytes bytes = test::bytesOf(path());
+  Bytes bytes = test::bytesIn(path());
   constexpr std::size_t kPacking = 1;
   const std::size_t mask =
       bytes.size() - kBrickVoxels * sizeof(float) - kPacking - sizeof(BrickMask);
@@ -499,7 +499,7 @@ TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
   auto grid = test::smallGrid();
   grid->setGridClass(openvdb::GRID_UNKNOWN);
   test::saveCompressed(path(), {grid}, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK);
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   // Three floats do not shrink, so the file ends with their negative size, -12, and the floats.
   const std::size_t at = whole.size() - 12 - 8;
   std::int64_t size = 0;
@@ -513,7 +513,7 @@ TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
 
 TEST_F(Damage, HugeCountsAndLengthsAskForNoMemory) {
   test::save(path(), {test::smallGrid()});
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   constexpr std::uint32_t kHuge = 0xfffffff0u;
   constexpr std::size_t kMetadataCount = 8 + 4 + 4 + 4 + 1 + 36;  // follows the header
   EXPECT_FALSE(readable(withValueAt(whole, kMetadataCount, kHuge)));
@@ -525,7 +525,7 @@ TEST_F(Damage, HugeCountsAndLengthsAskForNoMemory) {
 
 TEST_F(Damage, ADirectoryThatRunsInCirclesEnds) {
   test::save(path(), {test::smallGrid(), test::smallGrid()});
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   constexpr std::size_t kGridCount = 8 + 4 + 4 + 4 + 1 + 36 + 4;
   const std::size_t positions = find(whole, "Tree_float_5_4_3") + 16 + 4;
   auto circle = withValueAt(whole, kGridCount, std::int32_t{0x7fffffff});
@@ -551,7 +551,7 @@ TEST_F(Damage, RealFilesCutOrAlteredDoNoHarm) {
   std::mt19937 random(1);
   for (const char* name : {"edge/background_one.vdb", "edge/three_grids_named_density.vdb",
                            "dragon_with_xform.vdb", "aneurism.vdb", "edge/double_grid.vdb"}) {
-    const Bytes whole = test::bytesOf(test::dataDir() / name);
+    const Bytes whole = test::bytesIn(test::dataDir() / name);
     for (int i = 0; i < 20; ++i) {
       const std::size_t size = random() % whole.size();
       EXPECT_FALSE(readable(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(size)))) << size;

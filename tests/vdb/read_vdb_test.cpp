@@ -518,7 +518,7 @@ TEST_F(Names, OfTypesThatOpenVdbDoesNotKnowAreListedToo) {
   const auto other = test::smallGrid();
   other->setName("other");
   test::save(path(), {other, test::smallGrid()});
-  auto bytes = test::bytesOf(path());
+  auto bytes = test::bytesIn(path());
   const std::string known = "Tree_float_5_4_3", odd = "Tree_float_4_3_3";
   const auto asByte = [](std::byte b, char c) { return b == std::byte(c); };
   const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(), asByte);

@@ -15,7 +15,7 @@
 #include <limits>
 
 #include "esvr/error.h"
-#include "support/file_size_limit.h"
+#include "support/files.h"
 #include "vdb/made_files.h"
 
 namespace esvr {
@@ -26,8 +26,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-std::vector<test::VoxelValue> fullBrick(Coord corner, float value) {
-  std::vector<test::VoxelValue> voxels;
+std::vector<test::Voxel> fullBrick(Coord corner, float value) {
+  std::vector<test::Voxel> voxels;
   for (int i = 0; i < kBrickVoxels; ++i) voxels.push_back({corner + voxelLocal(i), value});
   return voxels;
 }
@@ -83,7 +83,7 @@ TEST_F(Write, LeavesRemainWhereAllVoxelsWouldBeInTiles) {
 }
 
 TEST_F(Write, AMergedTileOfManyBricksKeepsALeafToo) {
-  std::vector<test::VoxelValue> voxels;
+  std::vector<test::Voxel> voxels;
   for (int brick = 0; brick < 4096; ++brick) {
     const Coord corner = Coord{brick / 256, brick / 16 % 16, brick % 16} * kBrickSide;
     const auto more = fullBrick(corner, 0.5f);
@@ -207,8 +207,8 @@ TEST_F(Write, IsPackedByBloscAndActiveMask) {
 }
 
 /// Voxels in many leaves whose compressed bytes differ.
-std::vector<test::VoxelValue> leavesOfManySizes() {
-  std::vector<test::VoxelValue> voxels;
+std::vector<test::Voxel> leavesOfManySizes() {
+  std::vector<test::Voxel> voxels;
   for (int leaf = 0; leaf < 64; ++leaf)
     for (int i = 0; i <= 8 * leaf; ++i)
       voxels.push_back({Coord{8 * leaf, 0, 0} + voxelLocal(i), std::sin(float(i * leaf))});

@@ -6,13 +6,13 @@
 #include <memory>
 #include <span>
 
+#include "bench/stability/stability.h"
 #include "core/device_choice.h"
 #include "esvr/error.h"
 #include "esvr/fit.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid.h"
 #include "fit/run.h"
-#include "stability.h"
 #ifdef ESVR_WITH_CUDA
 #include "core/cuda/runtime.h"
 #include "fit/cuda/cuda_optimiser.h"

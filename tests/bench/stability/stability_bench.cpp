@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
+#include "bench/stability/stability.h"
 #include "esvr/field.h"
 #include "esvr/render.h"
-#include "stability.h"
 
 namespace {
 

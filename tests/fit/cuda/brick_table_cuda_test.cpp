@@ -7,8 +7,8 @@
 
 #include "core/cuda/device_buffer.h"
 #include "core/cuda/runtime.h"
+#include "fit/cuda/gpu_test.h"
 #include "fit/cuda/lists.h"
-#include "gpu_test.h"
 
 namespace esvr::cuda {
 namespace {

@@ -9,12 +9,12 @@
 #include <cmath>
 #include <vector>
 
-#include "../gradient_cases.h"
-#include "../random_ellipsoids.h"
-#include "../volumes.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/cuda/cuda_optimiser.h"
-#include "gpu_test.h"
+#include "fit/cuda/gpu_test.h"
+#include "fit/gradient_cases.h"
+#include "fit/gradient_scene.h"
+#include "fit/volumes.h"
 
 namespace esvr {
 namespace {

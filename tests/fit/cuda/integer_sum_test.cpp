@@ -8,10 +8,10 @@
 #include <cmath>
 #include <cstdint>
 
-#include "../random_ellipsoids.h"
-#include "../volumes.h"
 #include "fit/cuda/cuda_optimiser.h"
-#include "gpu_test.h"
+#include "fit/cuda/gpu_test.h"
+#include "fit/gradient_scene.h"
+#include "fit/volumes.h"
 
 namespace esvr {
 namespace {

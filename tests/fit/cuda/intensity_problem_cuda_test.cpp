@@ -1,8 +1,8 @@
 // Plan: the tests of intensity_cases.h run on a GPU. Passes over many overlapping ellipsoids agree
 // with those of the CPU, and have the same bits in every run.
 
-#include "../intensity_cases.h"
-#include "gpu_test.h"
+#include "fit/cuda/gpu_test.h"
+#include "fit/intensity_cases.h"
 
 namespace esvr {
 namespace {

@@ -8,12 +8,12 @@
 #include <chrono>
 #include <cmath>
 
-#include "../random_ellipsoids.h"
-#include "../volumes.h"
 #include "fit/cpu/cpu_optimiser.h"
 #include "fit/cuda/cuda_optimiser.h"
+#include "fit/cuda/gpu_test.h"
 #include "fit/cuda/memory_plan.h"
-#include "gpu_test.h"
+#include "fit/gradient_scene.h"
+#include "fit/volumes.h"
 
 namespace esvr {
 namespace {

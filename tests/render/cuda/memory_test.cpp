@@ -10,7 +10,7 @@
 #include "field/random_field.h"
 #include "render/cuda/cell_store.h"
 #include "render/scenes.h"
-#include "support/on_device.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 namespace {
