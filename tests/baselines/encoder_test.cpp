@@ -26,6 +26,7 @@
 #include "esvr/vdb_io.h"
 #include "metrics/volumes.h"
 #include "support/files.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -88,8 +89,7 @@ TEST(Setting, listsTheValidSettings) {
     (void)parseBaseline("gzip");
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_THAT(error.what(),
-                testing::AllOf(testing::HasSubstr("gzip"), testing::HasSubstr("nvdb-fpn")));
+    EXPECT_THAT(error.what(), test::Says("gzip", "nvdb-fpn"));
   }
 }
 

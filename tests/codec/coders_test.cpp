@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "codec/brick_coder.h"
-#include "codec/byte_coder.h"
 #include "codec/range_coder.h"
 #include "codec/symbol_coder.h"
 

@@ -11,8 +11,7 @@
 #include <cmath>
 #include <memory>
 
-#include "codec/least_squares.h"
-#include "codec/past_voxels.h"
+#include "codec/frame_coder.h"
 #include "field/random_field.h"
 #include "fit/volumes.h"
 

@@ -10,7 +10,6 @@
 #include <cmath>
 
 #include "codec/lattice.h"
-#include "codec/quantise.h"
 #include "esvr/error.h"
 #include "field/random_field.h"
 

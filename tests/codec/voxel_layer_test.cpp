@@ -17,12 +17,12 @@
 #include <functional>
 #include <limits>
 
-#include "codec/voxel_values.h"
+#include "codec/voxel_coder.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/quantised.h"
 #include "fit/volumes.h"
-#include "format/voxel_section.h"
+#include "format/voxel_sections.h"
 
 namespace esvr {
 namespace {

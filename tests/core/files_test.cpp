@@ -26,16 +26,14 @@
 #include "core/read_input.h"
 #include "esvr/error.h"
 #include "support/files.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
 
 namespace fs = std::filesystem;
-using test::readText;
 using testing::ElementsAre;
-using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::ThrowsMessage;
 
 class AtomicFileTest : public testing::Test {
  protected:
@@ -55,7 +53,7 @@ TEST_F(AtomicFileTest, AppearsOnlyOnCommit) {
   file.write(bytesOf("two"));
   EXPECT_FALSE(fs::exists(target()));
   file.commit();
-  EXPECT_EQ(readText(target()), "one two");
+  EXPECT_EQ(test::readText(target()), "one two");
   EXPECT_EQ(entries(), 1u);
 }
 
@@ -72,14 +70,14 @@ TEST_F(AtomicFileTest, TakesWhatALibraryWritesByName) {
   AtomicFile file(target(), false);
   put(file.path(), "by name");
   file.commit();
-  EXPECT_EQ(readText(target()), "by name");
+  EXPECT_EQ(test::readText(target()), "by name");
 }
 
 TEST_F(AtomicFileTest, RefusesAnExistingTargetAndKeepsIt) {
   put(target(), "old");
   EXPECT_THAT([&] { AtomicFile(target(), false); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("exists already")));
-  EXPECT_EQ(readText(target()), "old");
+              test::ThrowsSaying<RuntimeFailure>("exists already"));
+  EXPECT_EQ(test::readText(target()), "old");
   EXPECT_EQ(entries(), 1u);
 }
 
@@ -88,16 +86,16 @@ TEST_F(AtomicFileTest, RefusesATargetThatAppearedMeanwhile) {
   file.write(bytesOf("new"));
   put(target(), "somebody else's");
   EXPECT_THROW(file.commit(), RuntimeFailure);
-  EXPECT_EQ(readText(target()), "somebody else's");
+  EXPECT_EQ(test::readText(target()), "somebody else's");
 }
 
 TEST_F(AtomicFileTest, ReplacesWhenAskedAndKeepsTheFileUntilThen) {
   put(target(), "old");
   AtomicFile file(target(), true);
   file.write(bytesOf("new"));
-  EXPECT_EQ(readText(target()), "old");
+  EXPECT_EQ(test::readText(target()), "old");
   file.commit();
-  EXPECT_EQ(readText(target()), "new");
+  EXPECT_EQ(test::readText(target()), "new");
 }
 
 TEST_F(AtomicFileTest, ReplacingDoesNotWidenPermissions) {
@@ -115,19 +113,19 @@ TEST_F(AtomicFileTest, FollowsASymbolicLink) {
   file.write(bytesOf("new"));
   file.commit();
   EXPECT_TRUE(fs::is_symlink(target()));
-  EXPECT_EQ(readText(folder_ / "real"), "new");
+  EXPECT_EQ(test::readText(folder_ / "real"), "new");
 }
 
 TEST_F(AtomicFileTest, RefusesDevicesAndDirectoriesEvenWhenAskedToReplace) {
   EXPECT_THAT([&] { AtomicFile("/dev/full", true); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("/dev/full")));
+              test::ThrowsSaying<RuntimeFailure>("/dev/full"));
   EXPECT_THAT([&] { AtomicFile(folder_.path(), true); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("not a regular file")));
+              test::ThrowsSaying<RuntimeFailure>("not a regular file"));
 }
 
 TEST_F(AtomicFileTest, NamesAMissingDirectory) {
   EXPECT_THAT([&] { AtomicFile(folder_ / "no" / "out.esvr", false); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("no/out.esvr: No such file")));
+              test::ThrowsSaying<RuntimeFailure>("no/out.esvr: No such file"));
 }
 
 TEST_F(AtomicFileTest, AFullDiskIsAFailureAndLeavesTheOldFile) {
@@ -136,10 +134,9 @@ TEST_F(AtomicFileTest, AFullDiskIsAFailureAndLeavesTheOldFile) {
     AtomicFile file(target(), true);
     const test::FileSizeLimit limit(1000);
     const std::string big(5000, 'x');
-    EXPECT_THAT([&] { file.write(bytesOf(big)); },
-                ThrowsMessage<RuntimeFailure>(HasSubstr("out.esvr")));
+    EXPECT_THAT([&] { file.write(bytesOf(big)); }, test::ThrowsSaying<RuntimeFailure>("out.esvr"));
   }
-  EXPECT_EQ(readText(target()), "old");
+  EXPECT_EQ(test::readText(target()), "old");
   EXPECT_EQ(entries(), 1u);
 }
 
@@ -172,7 +169,7 @@ TEST_F(AtomicFileTest, SlowSurvivesBeingKilled) {
     ::usleep(useconds_t(500 + 97 * round));
     ::kill(writer, SIGKILL);
     ASSERT_EQ(::waitpid(writer, nullptr, 0), writer);
-    const std::string content = readText(target());
+    const std::string content = test::readText(target());
     ASSERT_TRUE(content == oldContent || content == newContent) << content.size();
     leftOver += entries() > 1 ? 1 : 0;
   }
@@ -230,7 +227,7 @@ class PartialFileTest : public testing::Test {
   }
   void expectRefused(bool overwrite, PartialStart start, const char* words) const {
     EXPECT_THAT(std::function<void()>([&] { PartialFile(target(), overwrite, start); }),
-                ThrowsMessage<RuntimeFailure>(HasSubstr(words)));
+                test::ThrowsSaying<RuntimeFailure>(words));
   }
   test::TemporaryFolder folder_;
 };
@@ -246,7 +243,7 @@ TEST_F(PartialFileTest, IsContinuedUntilItIsComplete) {
   file.replaceStart(std::as_bytes(std::span(std::string_view("ONE"))));
   file.commit();
   EXPECT_THAT(folder_.names(), ElementsAre("out.esvr"));
-  EXPECT_EQ(readText(target()), "ONE three");
+  EXPECT_EQ(test::readText(target()), "ONE three");
 }
 
 TEST_F(PartialFileTest, LeavesNothingWithoutContent) {
@@ -257,7 +254,7 @@ TEST_F(PartialFileTest, LeavesNothingWithoutContent) {
 TEST_F(PartialFileTest, IsRefusedAsWanted) {
   leave("one");
   expectRefused(false, PartialStart::kRefuse, "out.esvr.partial");
-  EXPECT_EQ(readText(PartialFile::pathFor(target())), "one");
+  EXPECT_EQ(test::readText(PartialFile::pathFor(target())), "one");
 }
 
 TEST_F(PartialFileTest, FollowsNoLinkAndOpensNoPipe) {
@@ -265,7 +262,7 @@ TEST_F(PartialFileTest, FollowsNoLinkAndOpensNoPipe) {
   std::ofstream(folder_ / "other") << "other";
   fs::create_symlink(folder_ / "other", partial);
   expectRefused(true, PartialStart::kContinue, "cannot write");
-  EXPECT_EQ(readText(folder_ / "other"), "other");
+  EXPECT_EQ(test::readText(folder_ / "other"), "other");
   fs::remove(partial);
   ASSERT_EQ(::mkfifo(partial.c_str(), 0600), 0);
   expectRefused(true, PartialStart::kContinue, "not a regular file");
@@ -292,7 +289,7 @@ TEST_F(PartialFileTest, DoesNotTouchWhatAnotherProcessHasJustCompletedSlow) {
       } catch (const RuntimeFailure&) {  // the first process still has the lock
       }
     first.join();
-    ASSERT_EQ(readText(target()), "first");
+    ASSERT_EQ(test::readText(target()), "first");
   }
 }
 
@@ -306,9 +303,9 @@ TEST_F(PartialFileTest, KeepsATargetThatExists) {
   expectRefused(false, PartialStart::kContinue, "exists already");
   PartialFile file(target(), true, PartialStart::kContinue);
   file.append(std::as_bytes(std::span(std::string_view("new"))));
-  EXPECT_EQ(readText(target()), "old");
+  EXPECT_EQ(test::readText(target()), "old");
   file.commit();
-  EXPECT_EQ(readText(target()), "new");
+  EXPECT_EQ(test::readText(target()), "new");
 }
 
 TEST_F(PartialFileTest, FollowsALinkToTheTarget) {
@@ -320,12 +317,10 @@ TEST_F(PartialFileTest, FollowsALinkToTheTarget) {
   EXPECT_TRUE(fs::exists(folder_ / "elsewhere/real.esvr.partial"));
   file.commit();
   EXPECT_TRUE(fs::is_symlink(target()));
-  EXPECT_EQ(readText(target()), "new");
+  EXPECT_EQ(test::readText(target()), "new");
 }
 
 // ---- Input files
-
-using testing::AllOf;
 
 class ReadInput : public testing::Test {
  protected:
@@ -359,15 +354,14 @@ TEST_F(ReadInput, WaitsForAProgramThatWritesToAPipe) {
 TEST_F(ReadInput, GivesUpIfNoProgramWritesToAPipeSlow) {
   makePipe();
   EXPECT_THAT([&] { (void)readText(path()); },
-              ThrowsMessage<BadInput>(AllOf(HasSubstr("input"), HasSubstr("no program writes"))));
+              test::ThrowsSaying<BadInput>("input", "no program writes"));
 }
 
 TEST_F(ReadInput, RefusesFoldersDevicesAndMissingFiles) {
-  EXPECT_THAT([&] { (void)readText(folder_.path()); },
-              ThrowsMessage<BadInput>(HasSubstr("folder")));
+  EXPECT_THAT([&] { (void)readText(folder_.path()); }, test::ThrowsSaying<BadInput>("folder"));
   EXPECT_THAT([] { (void)readText("/dev/zero"); },
-              ThrowsMessage<BadInput>(HasSubstr("neither a file nor a pipe")));
-  EXPECT_THAT([&] { (void)readText(path()); }, ThrowsMessage<BadInput>(HasSubstr("No such file")));
+              test::ThrowsSaying<BadInput>("neither a file nor a pipe"));
+  EXPECT_THAT([&] { (void)readText(path()); }, test::ThrowsSaying<BadInput>("No such file"));
 }
 
 TEST_F(ReadInput, WatchesForAReplacedAChangedAndARemovedFile) {
@@ -376,7 +370,7 @@ TEST_F(ReadInput, WatchesForAReplacedAChangedAndARemovedFile) {
   EXPECT_NO_THROW(watched.requireUnchanged());
   const auto expectChange = [&](const WatchedInputs& inputs, const char* what) {
     EXPECT_THAT([&] { inputs.requireUnchanged(); },
-                ThrowsMessage<BadInput>(AllOf(HasSubstr(path().string()), HasSubstr(what))));
+                test::ThrowsSaying<BadInput>(path().string(), what));
   };
   std::ofstream(folder_ / "other") << "new";
   fs::rename(folder_ / "other", path());

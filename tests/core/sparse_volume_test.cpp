@@ -30,12 +30,10 @@
 #include "esvr/grid.h"
 #include "esvr/volume.h"
 #include "support/files.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
-
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 // Bricks and voxels.
 
@@ -153,7 +151,7 @@ TEST(MakeVolume, RefusesTwoBricksOfOneCorner) {
       [] {
         (void)makeVolume({brickWith({8, 0, 0}, {}), brickWith({8, 0, 0}, {})}, 0.0f);
       },
-      ThrowsMessage<BadInput>(HasSubstr("(8, 0, 0)")));
+      test::ThrowsSaying<BadInput>("(8, 0, 0)"));
 }
 
 TEST(MakeVolume, RefusesBricksFurtherApartThanAVolumeAllows) {
@@ -161,7 +159,7 @@ TEST(MakeVolume, RefusesBricksFurtherApartThanAVolumeAllows) {
   const auto apart = [&](std::int32_t x) {
     return makeVolume({brickWith(low, {}), brickWith({x, 0, 0}, {})}, 0.0f);
   };
-  EXPECT_THAT([&] { (void)apart(1 << 30); }, ThrowsMessage<BadInput>(HasSubstr("2^31")));
+  EXPECT_THAT([&] { (void)apart(1 << 30); }, test::ThrowsSaying<BadInput>("2^31"));
   const auto widest = apart((1 << 30) - 16);
   checkInvariants(widest);
   EXPECT_EQ(valueAt(widest, {(1 << 30) - 16, 0, 0}), 1.0f);

@@ -10,9 +10,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/adam.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid.h"
-#include "fit/gradient.h"
 #include "fit/gradient_cases.h"
 #include "fit/gradient_scene.h"
 

@@ -70,14 +70,6 @@ TEST(HostileFile, AnUnknownOptionalSectionIsSkipped) {
   EXPECT_EQ(difference(decodeEsvr(file.assemble(), "f"), fileOf(plainGrid())), "");
 }
 
-TEST(HostileFile, AnUnknownOptionalSectionIsChecked) {
-  CraftedFile file(plainFile());
-  file.add({SectionKind(kUnknownKind)}, 0, bytesOf("later"));
-  auto bytes = file.assemble();
-  bytes.back() ^= std::byte{1};
-  EXPECT_THAT(refusalToRead(bytes), HasSubstr("checksum"));
-}
-
 TEST(HostileFile, ANewerMinorVersionIsRead) {
   CraftedFile file(plainFile());
   file.versionMinor = 42;

@@ -17,7 +17,7 @@
 #include "format/encode.h"
 #include "format/non_finite_section.h"
 #include "format/section_table.h"
-#include "format/sequence_index.h"
+#include "format/sequence_file.h"
 #include "support/non_finite.h"
 
 namespace esvr::test {

@@ -27,9 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::ElementsAre;
-using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::ThrowsMessage;
 using Groups = std::vector<std::vector<std::int64_t>>;
 
 /// Metadata of a file. stringItem of esvr/vdb_io.h would link the test with OpenVDB.
@@ -260,7 +258,7 @@ class SequenceFile : public testing::Test {
   }
   template <class Refused>
   static void expectRefused(const std::function<void()>& action, const char* words) {
-    EXPECT_THAT(action, ThrowsMessage<Refused>(HasSubstr(words)));
+    EXPECT_THAT(action, ThrowsSaying<Refused>(words));
   }
   TemporaryFolder folder_;
 };

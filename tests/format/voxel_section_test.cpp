@@ -22,7 +22,7 @@
 #include "format/allocation_meter.h"
 #include "format/non_finite_section.h"
 #include "format/sample_files.h"
-#include "format/voxel_section.h"
+#include "format/voxel_sections.h"
 #include "support/files.h"
 #include "support/machine.h"
 #include "support/messages.h"

@@ -21,18 +21,14 @@
 #include <sstream>
 
 #include "esvr/error.h"
-#include "generators/hash_noise.h"
-#include "generators/paper_volumes.h"
 #include "generators/sample_kinds.h"
 #include "generators/shapes.h"
-#include "generators/skeleton.h"
 #include "generators/tubes.h"
 #include "generators/voxelise.h"
+#include "support/messages.h"
 
 namespace esvr::samples {
 namespace {
-
-using testing::HasSubstr;
 
 // Shapes.
 
@@ -274,7 +270,7 @@ TEST(SampleKinds, haveNamesOfTheirOwnAndActiveVoxels) {
 TEST(SampleKind, listsTheNamesForAnUnknownOne) {
   EXPECT_EQ(sampleKind("plume").name, std::string("plume"));
   EXPECT_THAT([] { (void)sampleKind("smoke"); },
-              testing::ThrowsMessage<UsageError>(HasSubstr("tree, plume, blobs")));
+              test::ThrowsSaying<UsageError>("tree, plume, blobs"));
 }
 
 TEST(SampleKinds, areOneSizeInWorldSpaceWhateverTheResolution) {
@@ -304,9 +300,6 @@ TEST(SampleKinds, twoGridsDifferInEverythingAConverterMayLose) {
 }
 
 // ---- Skeletons
-
-using testing::AllOf;
-using testing::ThrowsMessage;
 
 Skeleton parse(const std::string& text) {
   std::istringstream stream(text);
@@ -341,8 +334,7 @@ class RefusedSwc : public testing::TestWithParam<BadSwc> {};
 
 TEST_P(RefusedSwc, namesFileLineAndReason) {
   EXPECT_THAT([] { (void)parse(GetParam().text); },
-              ThrowsMessage<BadInput>(AllOf(HasSubstr("test.swc"), HasSubstr(GetParam().line),
-                                            HasSubstr(GetParam().reason))));
+              test::ThrowsSaying<BadInput>("test.swc", GetParam().line, GetParam().reason));
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -23,22 +23,21 @@
 
 #include "esvr/error.h"
 #include "support/machine.h"
+#include "support/messages.h"
 #include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"
 
 namespace esvr {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::ThrowsMessage;
 
 class Input : public testing::Test {
  protected:
   void expectRefused(const std::filesystem::path& path, const std::string& why) const {
-    const auto says = ThrowsMessage<BadInput>(AllOf(HasSubstr(path.string()), HasSubstr(why)));
+    const auto says = test::ThrowsSaying<BadInput>(path.string(), why);
     EXPECT_THAT([&] { (void)inspectVdb(path); }, says);
     EXPECT_THAT([&] { (void)readGrid(path, "density"); }, says);
   }
@@ -49,32 +48,27 @@ class Input : public testing::Test {
   test::TemporaryFolder directory_;
 };
 
-TEST_F(Input, IsRefusedIfItIsMissing) { expectRefused(directory_ / "missing.vdb", "no such file"); }
-TEST_F(Input, IsRefusedIfItIsADirectory) { expectRefused(directory_.path(), "is a directory"); }
-TEST_F(Input, IsRefusedIfItIsADevice) { expectRefused("/dev/null", "not a regular file"); }
-TEST_F(Input, IsRefusedIfItIsEmpty) { expectRefused(fileWith(""), "is empty"); }
-TEST_F(Input, IsRefusedIfItIsOneByte) {
-  expectRefused(fileWith(" "), "neither an OpenVDB nor a NanoVDB");
-}
-TEST_F(Input, IsRefusedIfItIsText) {
-  expectRefused(fileWith("#Blender's idea of a volume\n"), "neither an OpenVDB nor a NanoVDB");
+TEST_F(Input, IsRefusedWhereItIsNoVolume) {
+  expectRefused(directory_ / "missing.vdb", "no such file");
+  expectRefused(directory_.path(), "is a directory");
+  expectRefused("/dev/null", "not a regular file");
+  expectRefused(fileWith(""), "is empty");
+  for (const char* text : {" ", "#Blender's idea of a volume\n"})
+    expectRefused(fileWith(text), "neither an OpenVDB nor a NanoVDB");
 }
 
-TEST_F(Input, IsRefusedIfItIsTooOld) {
-  test::save(directory_ / "old.vdb", {test::smallGrid()});
-  auto bytes = test::bytesIn(directory_ / "old.vdb");
-  bytes[8] = std::byte{221};  // the version follows the magic number
-  test::writeBytes(directory_ / "old.vdb", bytes);
-  expectRefused(directory_ / "old.vdb", "version 221");
-}
-
-TEST_F(Input, OfANewerFormatVersionIsTried) {
-  // OpenVDB 13 writes version 225 into every file, and nothing else changed for float grids.
-  test::save(directory_ / "new.vdb", {test::smallGrid()});
-  auto bytes = test::bytesIn(directory_ / "new.vdb");
-  bytes[8] = std::byte{225};
-  test::writeBytes(directory_ / "new.vdb", bytes);
-  EXPECT_EQ(activeVoxelCount(readGrid(directory_ / "new.vdb", "density").volume), 3u);
+// OpenVDB 13 writes version 225 into every file, and nothing else changed for float grids.
+TEST_F(Input, IsRefusedIfItIsTooOldAndTriedIfItIsNewer) {
+  test::save(directory_ / "a.vdb", {test::smallGrid()});
+  auto bytes = test::bytesIn(directory_ / "a.vdb");
+  for (const int version : {221, 225}) {
+    bytes[8] = std::byte(version);  // it follows the magic number
+    test::writeBytes(directory_ / "a.vdb", bytes);
+    if (version == 221)
+      expectRefused(directory_ / "a.vdb", "version 221");
+    else
+      EXPECT_EQ(activeVoxelCount(readGrid(directory_ / "a.vdb", "density").volume), 3u);
+  }
 }
 
 /// Grids of several types, two of which share a tree. The last one is of a type that unknownWords() changes.
@@ -339,8 +333,7 @@ TEST_F(Carried, GridsLargerThanTheLimitAreRefusedWithTheirSize) {
       [&] {
         (void)readCarried(in(), {&place, 1}, {.maxBytes = 100'000});
       },
-      ThrowsMessage<MemoryExceeded>(
-          AllOf(HasSubstr("in.vdb"), HasSubstr("\"large\""), HasSubstr("1 MB"))));
+      test::ThrowsSaying<MemoryExceeded>("in.vdb", "\"large\"", "1 MB"));
   const VoxelMemory files({.folder = directory_ / ".", .maxHeapBytes = 1000});
   const auto inFile = readCarried(in(), {&place, 1}, {.maxBytes = 100'000, .memory = files});
   EXPECT_EQ(inFile.front().bytes.size(), inspectVdb(in()).grids.front().storedBytes);
@@ -350,7 +343,7 @@ TEST_F(Carried, GridsCannotBeWrittenToNanoVdb) {
   test::save(in(), {test::emptyGrid("Tree_vec3s_5_4_3", "v")});
   const auto grids = carryAll(in());
   EXPECT_THAT([&] { writeGrids(directory_ / "out.nvdb", {}, toWrite(grids)); },
-              ThrowsMessage<UsageError>(AllOf(HasSubstr("\"v\""), HasSubstr(".vdb"))));
+              test::ThrowsSaying<UsageError>("\"v\"", ".vdb"));
 }
 
 TEST_F(Carried, GridsOfAnotherVersionOfTheFormatAreRefused) {
@@ -362,13 +355,13 @@ TEST_F(Carried, GridsOfAnotherVersionOfTheFormatAreRefused) {
   const auto grids = inspectVdb(in()).grids;
   EXPECT_THAT(grids[0].whyNotCarried, IsEmpty());
   EXPECT_THAT(grids[1].whyNotCarried, HasSubstr("223"));
-  EXPECT_THAT([&] { (void)carryAll(in()); }, ThrowsMessage<BadInput>(HasSubstr("223")));
+  EXPECT_THAT([&] { (void)carryAll(in()); }, test::ThrowsSaying<BadInput>("223"));
 
   const std::size_t place = 0;
   auto future = readCarried(in(), {&place, 1});
   future.front().vdbVersion = 1000;
   EXPECT_THAT([&] { writeGrids(out(), {}, toWrite(future)); },
-              ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr("density"), HasSubstr("1000"))));
+              test::ThrowsSaying<RuntimeFailure>("density", "1000"));
 }
 
 TEST_F(Carried, GridsOfTheFormatOfOpenVdb13AreCarriedByEarlierVersionsToo) {
@@ -491,7 +484,7 @@ TEST_F(Damage, ALeafWithoutTheActiveVoxelsOfItsTreeIsRefused) {
   std::fill_n(bytes.begin() + std::ptrdiff_t(mask), sizeof(BrickMask), std::byte{0});
   test::writeBytes(path(), bytes);
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
-              ThrowsMessage<BadInput>(HasSubstr("two different masks")));
+              test::ThrowsSaying<BadInput>("two different masks"));
 }
 
 TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
@@ -543,7 +536,7 @@ TEST_F(Damage, AFrustumWithinAFrustumIsRefused) {
   nested.insert(nested.end(), whole.begin() + std::ptrdiff_t(outer) - 4, whole.end());
   test::writeBytes(path(), nested);
   EXPECT_THAT([&] { (void)inspectVdb(path()); },
-              ThrowsMessage<BadInput>(HasSubstr("frustum within a frustum")));
+              test::ThrowsSaying<BadInput>("frustum within a frustum"));
 }
 
 TEST_F(Damage, RealFilesCutOrAlteredDoNoHarm) {

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "field/random_field.h"
-#include "render/view/page.h"
 #include "render/view/server.h"
 #include "render/view/view_client.h"
 #include "support/messages.h"
@@ -34,7 +33,6 @@ using test::SocketClosed;
 using test::statusOf;
 using test::ViewAnswer;
 using test::ViewClient;
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -109,12 +107,11 @@ class ServerTest : public testing::Test {
 TEST_F(ServerTest, GivesThePageToThoseWhoKnowTheToken) {
   const std::string answer = answerTo(at_, getRequest(at_, page()));
   ASSERT_EQ(statusOf(answer), 200);
-  EXPECT_THAT(answer, AllOf(HasSubstr("Content-Type: text/html; charset=utf-8\r\n"),
-                            HasSubstr("X-Content-Type-Options: nosniff\r\n"),
-                            HasSubstr("Referrer-Policy: no-referrer\r\n"),
-                            HasSubstr("Cache-Control: no-store\r\n"),
-                            HasSubstr("Cross-Origin-Resource-Policy: same-origin\r\n"),
-                            HasSubstr("Content-Security-Policy: default-src 'none'; ")));
+  EXPECT_THAT(answer, test::Says("Content-Type: text/html; charset=utf-8\r\n",
+                                 "X-Content-Type-Options: nosniff\r\n",
+                                 "Referrer-Policy: no-referrer\r\n", "Cache-Control: no-store\r\n",
+                                 "Cross-Origin-Resource-Policy: same-origin\r\n",
+                                 "Content-Security-Policy: default-src 'none'; "));
   EXPECT_THAT(answer, HasSubstr(std::string(viewPage().substr(viewPage().rfind('<')))));
 }
 

@@ -28,7 +28,6 @@
 
 #include "esvr/error.h"
 #include "render/view/desk.h"
-#include "render/view/jpeg_file.h"
 #include "render/view/painting.h"
 #include "render/view/studio.h"
 #include "render/view/view_client.h"

@@ -1,6 +1,8 @@
-#include "format/carried_bytes.h"
+// What needs libraries that the decoder-only build does not have: checksums by xxHash, and the bytes of carried grids, which
+// Blosc compresses.
 
 #include <blosc.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <limits>
@@ -10,9 +12,34 @@
 
 #include "core/parallel.h"
 #include "esvr/error.h"
+#include "format/bytes.h"
 #include "format/section_table.h"
 
 namespace esvr::format {
+namespace {
+
+constexpr XXH64_hash_t kSeed = 0;
+
+}  // namespace
+
+std::uint64_t checksum(std::span<const std::byte> bytes) {
+  return XXH64(bytes.data(), bytes.size(), kSeed);
+}
+
+RunningChecksum::RunningChecksum() : state_(XXH64_createState()) {
+  XXH64_reset(state_.get(), kSeed);
+}
+
+void RunningChecksum::add(std::span<const std::byte> piece) {
+  XXH64_update(state_.get(), piece.data(), piece.size());
+}
+
+std::uint64_t RunningChecksum::value() const { return XXH64_digest(state_.get()); }
+
+void RunningChecksum::Free::operator()(XXH64_state_s* state) const { XXH64_freeState(state); }
+
+// ---- The bytes of carried grids
+
 namespace {
 
 // Zstandard at this level gives the smallest sections among the fast settings.

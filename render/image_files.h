@@ -1,13 +1,32 @@
 #pragma once
-/// Encodes pictures as OpenEXR files with 32-bit floats.
+/// Encodes pictures as PNG files, and as OpenEXR files with 32-bit floats.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "esvr/image.h"
+#include "esvr/render.h"
 
 namespace esvr::render {
+
+struct PngText {
+  std::string software;  ///< program that wrote the file
+  std::string comment;   ///< its command line; UTF-8
+};
+
+struct PngForm {
+  std::optional<Rgb> background;  ///< color behind the picture; default: an RGBA file
+  int bits = 8;                   ///< bits of a channel, 8 or 16
+};
+
+/// Encodes a picture in sRGB, with colors that are not premultiplied.
+/// \throws RuntimeFailure  with libpng's message
+[[nodiscard]] std::vector<std::byte> encodePng(const Image& image, const PngForm& form,
+                                               const PngText& text);
+
+// ---- OpenEXR
 
 struct ExrText {
   std::string software;  ///< program that wrote the file
