@@ -17,11 +17,10 @@
 #include "esvr/error.h"
 #include "programs/command_line.h"
 #include "programs/files.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
 #include "programs/sequence.h"
-#include "programs/workers.h"
 
 namespace esvr::compare {
 

@@ -12,10 +12,10 @@
 #include "compare/figures.h"
 #include "esvr/metrics.h"
 #include "esvr/volume.h"
-#include "programs/frames.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
+#include "programs/sequence.h"
 
 namespace esvr::compare {
 
@@ -95,7 +95,7 @@ struct CheckRecord {
 /// \throws BadInput  the files cannot be compared
 void check(const CheckOptions& options);
 
-// What has been measured is judged by the limits of the options, and by a baseline (judge.cpp). A baseline has figures of
+// What has been measured is judged by the limits of the options, and by a baseline (figures.cpp). A baseline has figures of
 // an earlier run in a JSON file, for example
 //
 //     {"schema": "esvr-baseline", "schema_version": 1,

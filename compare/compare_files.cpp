@@ -15,8 +15,8 @@
 #include "esvr/grid.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
-#include "programs/messages.h"
-#include "programs/names.h"
+#include "programs/option_values.h"
+#include "programs/run_main.h"
 
 namespace esvr::compare {
 

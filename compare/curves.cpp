@@ -23,10 +23,9 @@
 #include "programs/data_table.h"
 #include "programs/files.h"
 #include "programs/option_values.h"
-#include "programs/page.h"
 #include "programs/page_figures.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
-#include "programs/workers.h"
 
 namespace esvr::compare {
 

@@ -17,7 +17,6 @@
 #include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
 #include "programs/run_main.h"
 

@@ -11,7 +11,7 @@
 #include "esvr/baseline.h"
 #include "esvr/device.h"
 #include "esvr/volume.h"
-#include "programs/memory.h"
+#include "programs/resources.h"
 
 namespace esvr::compare {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "programs/data_table.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::compare {
 

@@ -11,7 +11,6 @@
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"
 #include "programs/files.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
 #include "programs/page_figures.h"
 #include "programs/pictures.h"

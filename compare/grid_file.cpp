@@ -4,7 +4,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "programs/names.h"
+#include "programs/option_values.h"
 #include "programs/sequence.h"
 
 namespace esvr::compare {

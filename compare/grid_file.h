@@ -13,8 +13,8 @@
 #include "esvr/sequence_file.h"
 #include "esvr/vdb_io.h"
 #include "programs/files.h"
-#include "programs/frames.h"
-#include "programs/memory.h"
+#include "programs/resources.h"
+#include "programs/sequence.h"
 
 namespace esvr::compare {
 

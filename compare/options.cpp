@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "esvr/baseline.h"
+#include "programs/command_line.h"
 #include "programs/files.h"
-#include "programs/help_text.h"
 #include "programs/option_values.h"
 
 namespace esvr::compare {

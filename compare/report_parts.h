@@ -10,7 +10,6 @@
 #include "compare/finding.h"
 #include "compare/table_record.h"
 #include "programs/data_table.h"
-#include "programs/page.h"
 #include "programs/page_figures.h"
 
 namespace esvr::compare {

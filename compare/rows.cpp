@@ -12,10 +12,8 @@
 #include "esvr/fit.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
-#include "programs/names.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
 
 namespace esvr::compare {

@@ -14,8 +14,8 @@
 #include "programs/command_line.h"
 #include "programs/files.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
-#include "programs/workers.h"
 
 namespace esvr::compare {
 

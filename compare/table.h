@@ -12,8 +12,8 @@
 #include "compare/options.h"
 #include "esvr/baseline.h"
 #include "esvr/volume.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
 
 namespace esvr::compare {
 

@@ -14,10 +14,9 @@
 #include "esvr/error.h"
 #include "esvr/sequence_file.h"
 #include "programs/files.h"
-#include "programs/memory.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
 #include "programs/sequence.h"
-#include "programs/workers.h"
 
 namespace esvr::esvr2vdb {
 namespace {

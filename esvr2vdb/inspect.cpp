@@ -20,8 +20,8 @@
 #include "esvr/sequence_file.h"
 #include "esvr/splats.h"
 #include "esvr/vdb_io.h"
-#include "programs/messages.h"
-#include "programs/names.h"
+#include "programs/option_values.h"
+#include "programs/run_main.h"
 #include "programs/sequence.h"
 #include "programs/splat_input.h"
 

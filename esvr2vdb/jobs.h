@@ -14,8 +14,9 @@
 #include "esvr/splats.h"
 #include "esvr/vdb_io.h"
 #include "esvr/volume.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/option_values.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
 #include "programs/sequence.h"
 #include "programs/splat_input.h"
 

@@ -7,10 +7,9 @@
 #include "esvr2vdb/jobs.h"
 
 #include "programs/command_line.h"
-#include "programs/memory.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
-#include "programs/workers.h"
 
 namespace esvr::esvr2vdb {
 namespace {

@@ -9,6 +9,7 @@
 #include "esvr/error.h"
 #include "esvr/splats.h"
 #include "programs/files.h"
+#include "programs/option_values.h"
 #include "programs/run_main.h"
 #include "programs/splat_input.h"
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 
 #include "esvr/grid.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::report {
 

@@ -14,7 +14,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::report {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "esvr/splats.h"
 #include "programs/command_line.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
 
 namespace esvr::cli {
 

@@ -19,8 +19,8 @@
 #include <thread>
 
 #include "esvr/error.h"
-#include "programs/messages.h"
 #include "programs/pictures.h"
+#include "programs/run_main.h"
 
 extern char** environ;
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "esvr/image_metrics.h"
-#include "programs/messages.h"
 #include "programs/run_main.h"
 
 namespace esvr::render {

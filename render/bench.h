@@ -5,7 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "esvr/render.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::render {
 

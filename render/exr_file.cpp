@@ -1,4 +1,4 @@
-#include "render/exr_file.h"
+#include "render/image_files.h"
 
 #include <Iex.h>
 #include <ImfChannelList.h>

@@ -10,8 +10,8 @@
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
 #include "programs/command_line.h"
-#include "programs/memory.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 #include "programs/sequence.h"
 #include "programs/video_file.h"
 #include "render/camera_file.h"
@@ -207,7 +207,7 @@ void readPattern(const Arguments& a, const cli::FramePattern& pattern, Options& 
 /// Checks the options of an input that is a sequence.
 void checkSequenceOptions(const Arguments& a, const Options& options) {
   for (const char* option : {"turntable", "ref", "bench", "report"})
-    if (a.has(option) && !a.values[option].defaulted())
+    if (a.isGiven(option))
       throw UsageError("--" + std::string(option) + " cannot be combined with a sequence");
   for (const auto& output : {options.output.string(), a.find<std::string>("depth").value_or("")})
     if (!output.empty() && !report::isVideo(output) && !cli::FramePattern::in(output))

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "esvr/render.h"
-#include "programs/frames.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
+#include "programs/sequence.h"
 #include "render/scene.h"
 
 namespace esvr::render {

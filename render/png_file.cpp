@@ -1,4 +1,4 @@
-#include "render/png_file.h"
+#include "render/image_files.h"
 
 #include <png.h>
 

@@ -11,7 +11,7 @@
 #include "esvr/device.h"
 #include "esvr/grid_coding.h"
 #include "esvr/render.h"
-#include "programs/memory.h"
+#include "programs/resources.h"
 
 namespace esvr::render {
 

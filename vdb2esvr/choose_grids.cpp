@@ -6,7 +6,7 @@
 
 #include "esvr/convert_file.h"
 #include "esvr/error.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -3,8 +3,9 @@
 
 #include "esvr/encode.h"
 #include "programs/command_line.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/option_values.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
 #include "programs/sequence.h"
 #include "programs/splat_input.h"
 

@@ -8,7 +8,6 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "programs/messages.h"
 #include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {

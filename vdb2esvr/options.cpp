@@ -12,9 +12,9 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "programs/command_line.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
 #include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {

@@ -9,8 +9,8 @@
 
 #include "esvr/did_you_mean.h"
 #include "esvr/error.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
+#include "programs/run_main.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/report.h"
 

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "programs/files.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "esvr/fit.h"
-#include "programs/frames.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
+#include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {
 

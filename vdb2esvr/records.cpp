@@ -6,9 +6,9 @@
 #include <unordered_map>
 
 #include "esvr/error.h"
-#include "programs/messages.h"
 #include "programs/names.h"
 #include "programs/option_values.h"
+#include "programs/run_main.h"
 #include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {

@@ -6,11 +6,10 @@
 
 #include "esvr/grid.h"
 #include "esvr/volume.h"
+#include "programs/command_line.h"
 #include "programs/files.h"
-#include "programs/help_text.h"
-#include "programs/memory.h"
-#include "programs/names.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -7,7 +7,7 @@
 #include "esvr/container.h"
 #include "esvr/device.h"
 #include "esvr/workers.h"
-#include "programs/messages.h"
+#include "programs/run_main.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/records.h"
 

@@ -8,8 +8,8 @@
 #include <ostream>
 #include <utility>
 
-#include "programs/messages.h"
-#include "programs/names.h"
+#include "programs/option_values.h"
+#include "programs/run_main.h"
 #include "vdb2esvr/run.h"
 
 namespace esvr::vdb2esvr {

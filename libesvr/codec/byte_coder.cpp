@@ -1,10 +1,8 @@
-#include "codec/byte_coder.h"
+#include "codec/range_coder.h"
 
 #include <algorithm>
 #include <array>
 #include <utility>
-
-#include "codec/range_coder.h"
 
 namespace esvr::codec {
 namespace {

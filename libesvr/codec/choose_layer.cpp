@@ -13,7 +13,6 @@
 #include "codec/brick_coder.h"
 #include "codec/frame_coder.h"
 #include "codec/voxel_coder.h"
-#include "codec/voxel_values.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/quantised.h"

@@ -1,9 +1,7 @@
 // Quantising ellipsoids: the lattice whose steps cost the same squared error in every parameter, one description of
 // each ellipsoid, and the codes of its parameters, in the order of the file.
 
-#include "codec/quantise.h"
-
-#include <tbb/parallel_sort.h>
+#include "codec/lattice.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +11,6 @@
 #include <utility>
 
 #include "codec/brick_coder.h"
-#include "codec/lattice.h"
 #include "core/geometry.h"
 #include "core/parallel.h"
 #include "esvr/error.h"

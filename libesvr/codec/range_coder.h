@@ -278,4 +278,13 @@ class NumberModelOf {
 
 using NumberModel = NumberModelOf<5>;  ///< numbers below 2^31
 
+// ---- Bytes of records, lists of positions and the like: small numbers and texts that repeat (byte_coder.cpp)
+
+[[nodiscard]] std::vector<std::byte> encodeBytes(std::span<const std::byte> bytes);
+
+/// Decodes what encodeBytes() made of `count` bytes. Zeros after it are ignored. Damaged bytes are decoded,
+/// too, to others.
+[[nodiscard]] std::vector<std::byte> decodeBytes(std::span<const std::byte> coded,
+                                                 std::uint64_t count);
+
 }  // namespace esvr::codec

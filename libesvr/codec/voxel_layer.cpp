@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "codec/voxel_values.h"
+#include "codec/voxel_coder.h"
 #include "core/parallel.h"
 
 namespace esvr {

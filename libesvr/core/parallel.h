@@ -1,11 +1,14 @@
 #pragma once
 /// Loops on all threads that end when the token of the calling thread is set (esvr/device.h). They
-/// are those of oneTBB. The decoder-only build has a file of this name with loops that nothing cancels.
+/// are those of oneTBB. The decoder-only build has a file of this name with loops that nothing cancels, and with the part of
+/// oneTBB that it uses, so that its sources include oneTBB through this header only.
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/parallel_sort.h>
+#include <tbb/task_arena.h>
 
 #include <utility>
 
@@ -67,21 +70,6 @@ Value parallelDeterministicReduce(const Range& range, const Value& identity, con
         return body(part, std::move(value));
       },
       join);
-}
-
-/// Calls two functions at the same time.
-template <class First, class Second>
-void parallelInvoke(const First& first, const Second& second) {
-  const CancelToken* const token = CancelScope::token();
-  tbb::parallel_invoke(
-      [&] {
-        const CancelScope scope(token);
-        first();
-      },
-      [&] {
-        const CancelScope scope(token);
-        second();
-      });
 }
 
 }  // namespace esvr

@@ -12,7 +12,7 @@
 #include "esvr/error.h"
 #include "esvr/volume.h"
 #include "format/bytes.h"
-#include "format/carried_bytes.h"
+#include "format/section_table.h"
 
 namespace {
 

@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "codec/brick_coder.h"
-#include "codec/voxel_values.h"
+#include "codec/voxel_coder.h"
 #include "core/parallel.h"
 #include "encode/grids_of_file.h"
 #include "esvr/encode.h"
 #include "format/bytes.h"
-#include "format/predicted_sections.h"
+#include "format/voxel_sections.h"
 
 namespace esvr {
 namespace {

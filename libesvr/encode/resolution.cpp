@@ -15,7 +15,7 @@
 #include "esvr/field.h"
 #include "esvr/quantised.h"
 #include "esvr/vdb_io.h"
-#include "format/decode_bricks.h"
+#include "format/grid_rule.h"
 
 namespace esvr {
 

@@ -18,7 +18,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "format/section_table.h"
-#include "format/voxel_section.h"
+#include "format/voxel_sections.h"
 
 namespace esvr::encode {
 

@@ -1,9 +1,5 @@
 #include "field/brick_pairs.h"
 
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_sort.h>
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "esvr/error.h"
-#include "fit/chunks/fit_in_chunks.h"
+#include "fit/chunks/chunks.h"
 #include "fit/run.h"
 
 namespace esvr {

@@ -11,7 +11,7 @@
 #include "format/bytes.h"
 #include "format/frame_table.h"
 #include "format/records.h"
-#include "format/sequence_index.h"
+#include "format/sequence_file.h"
 
 namespace esvr {
 

@@ -21,7 +21,6 @@
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
 #include "field/voxel_rule.h"
-#include "format/decode_bricks.h"
 #include "format/grid_rule.h"
 #include "format/non_finite_section.h"
 

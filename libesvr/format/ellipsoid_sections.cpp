@@ -1,16 +1,417 @@
-// The sections of a chunk's ellipsoids.
+// The sections of a chunk's ellipsoids: blocks of quantised ellipsoids, with their lattice and their boxes, the bytes that
+// layers and streams take, and the sections themselves.
 
 #include "format/ellipsoid_sections.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
+#include "codec/brick_coder.h"
+#include "codec/lattice.h"
+#include "codec/range_coder.h"
 #include "core/counted.h"
 #include "core/geometry.h"
+#include "core/parallel.h"
+#include "esvr/container.h"
 #include "esvr/error.h"
+
+namespace esvr {
+namespace format {
+
+// ---- Boxes
+
+namespace {
+
+using Vec3 = std::array<double, 3>;
+
+std::int32_t clampedFloor(double v) {
+  return std::int32_t(std::clamp(std::floor(v), double(Box::kMin), double(Box::kMax)));
+}
+std::int32_t clampedCeil(double v) {
+  return std::int32_t(std::clamp(std::ceil(v), double(Box::kMin), double(Box::kMax)));
+}
+
+Vec3 centerOf(const Chunk& chunk, std::size_t i) {
+  const auto& c = chunk.ellipsoids.center;
+  return {chunk.origin.x + double(c[0][i]), chunk.origin.y + double(c[1][i]),
+          chunk.origin.z + double(c[2][i])};
+}
+
+/// Grows the box by [center - half, center + half].
+void expand(Box& box, const Vec3& center, const Vec3& half) {
+  box.expand(Coord{clampedFloor(center[0] - half[0]), clampedFloor(center[1] - half[1]),
+                   clampedFloor(center[2] - half[2])});
+  box.expand(Coord{clampedCeil(center[0] + half[0]), clampedCeil(center[1] + half[1]),
+                   clampedCeil(center[2] + half[2])});
+}
+
+/// Half widths of an ellipsoid's bounding box for a support radius of 1: the lengths of the rows of
+/// R S.
+Vec3 unitHalfWidths(const Ellipsoids& e, std::size_t i) {
+  const Matrix3 R =
+      rotationOf({e.rotation[0][i], e.rotation[1][i], e.rotation[2][i], e.rotation[3][i]});
+  Vec3 half{};
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t j = 0; j < 3; ++j)
+      half[a] = std::hypot(half[a], R[3 * a + j] * std::exp(double(e.logScale[j][i])));
+    // A scale that overflows gives 0 * inf; the box is then unbounded.
+    if (std::isnan(half[a])) half[a] = HUGE_VAL;
+  }
+  return half;
+}
+
+/// The radius of the support; 0 for the paper's kernel at a negative kappa, whose support is empty.
+double radiusOf(const Kernel& kernel, double kappa) {
+  const double radius = supportRadius(kernelConstants<double>(kernel, kappa));
+  return radius > 0.0 ? radius : 0.0;
+}
+
+}  // namespace
+
+Box supportBox(const Chunk& chunk, Run run, const Kernel& kernel) {
+  const auto& e = chunk.ellipsoids;
+  const double sceneRadius = radiusOf(kernel, kernel.kappa);
+  Box box;
+  for (std::size_t i = run.first; i < run.first + run.count; ++i) {
+    const double radius = e.kappa.empty() ? sceneRadius : radiusOf(kernel, e.kappa[i]);
+    Vec3 half = unitHalfWidths(e, i);
+    for (double& h : half) h = radius > 0.0 ? h * radius : 0.0;
+    expand(box, centerOf(chunk, i), half);
+  }
+  return box;
+}
+
+Box centerBox(const Chunk& chunk, Run run) {
+  Box box;
+  for (std::size_t i = run.first; i < run.first + run.count; ++i)
+    expand(box, centerOf(chunk, i), {});
+  return box;
+}
+
+// ---- The lattice
+
+namespace {
+
+constexpr int kMaxOffset = 1 << 20;  // limit on offsets of bits, for sums in 32 bits
+constexpr int kMaxSlope = 1 << 12;
+
+int getWithin(ByteReader& in, int limit, const char* what) {
+  const auto n = in.get<std::int32_t>();
+  if (n < -limit || n > limit) in.fail(std::string(what) + " of the lattice is out of range");
+  return n;
+}
+
+double getStep(ByteReader& in, const char* what) {
+  const auto step = in.get<double>();
+  if (!(std::isfinite(step) && step > 0.0))
+    in.fail(std::string(what) + " of the lattice is not a positive number");
+  return step;
+}
+
+}  // namespace
+
+void putLattice(ByteWriter& out, const Lattice& l) {
+  out.put(l.cell);
+  for (const auto low : {l.lowestCell.x, l.lowestCell.y, l.lowestCell.z}) out.put(low);
+  out.put(l.scaleStep);
+  out.put(l.lowestScale);
+  out.put(l.intensityStep);
+  for (const int n : {l.positionBase, l.positionSlope, l.scaleOffset, l.intensityBase,
+                      l.intensitySlope, l.rotationOffset})
+    out.put(std::int32_t(n));
+  out.put(std::uint8_t(l.cellBits));
+  out.put(std::uint8_t(l.signedIntensity));
+  out.put(std::uint8_t(l.rotationFrom.size()));
+  out.putAll(l.rotationFrom);
+}
+
+Lattice getLattice(ByteReader& in) {
+  Lattice l;
+  l.cell = getStep(in, "the cell");
+  l.lowestCell.x = in.get<std::int32_t>();
+  l.lowestCell.y = in.get<std::int32_t>();
+  l.lowestCell.z = in.get<std::int32_t>();
+  l.scaleStep = getStep(in, "the step of scales");
+  l.lowestScale = in.get<std::int32_t>();
+  l.intensityStep = getStep(in, "the step of intensities");
+  l.positionBase = getWithin(in, kMaxOffset, "the base of positions");
+  l.positionSlope = getWithin(in, kMaxSlope, "the slope of positions");
+  l.scaleOffset = getWithin(in, kMaxOffset, "the offset of scales");
+  l.intensityBase = getWithin(in, kMaxOffset, "the base of intensities");
+  l.intensitySlope = getWithin(in, kMaxSlope, "the slope of intensities");
+  l.rotationOffset = getWithin(in, kMaxOffset, "the offset of rotations");
+  l.cellBits = in.get<std::uint8_t>();
+  if (l.cellBits > Lattice::kMaxCellBits) in.fail("the lattice has too many cells");
+  l.signedIntensity = in.getEnum(std::uint8_t{1}, "mark of signs") != 0;
+  l.rotationFrom.resize(in.get<std::uint8_t>());
+  for (auto& from : l.rotationFrom) from = in.get<std::uint8_t>();
+  return l;
+}
+
+// ---- Blocks
+
+namespace {
+
+constexpr std::size_t kContexts = 8;
+std::size_t context(std::uint32_t value) { return std::min<std::size_t>(value, kContexts - 1); }
+
+/// The size of an ellipsoid as a context of its intensity: large ellipsoids are usually faint.
+constexpr std::size_t kSizes = 24;
+std::size_t sizeContext(const CoarseScales& s) {
+  return std::min<std::size_t>((3 * s.low + 2 * s.middle + s.high) / 2, kSizes - 1);
+}
+
+void require(bool holds, const char* what) {
+  if (!holds) throw BadInput(std::string(what) + " lies outside the lattice");
+}
+
+/// Encodes or decodes a run: first the position cells of all ellipsoids, then the other values,
+/// ellipsoid by ellipsoid.
+template <class Side>
+class BlockCoder {
+ public:
+  BlockCoder(std::array<Side, kStreams>& sides, QuantisedEllipsoids& q) : sides_(sides), q_(q) {}
+
+  void code(Run run) {
+    auto keys = keysOf(run);
+    codec::CellTree<Side>(sides_[0]).code(keys, 3 * q_.lattice.cellBits);
+    for (std::size_t k = 0; k < run.count; ++k) {
+      const std::size_t i = run.first + k;
+      const CoarseScales s = codeCoarseScales(i);
+      codeIntensity(s, i);
+      codePrecision(i);
+      codeScaleRests(s, i);
+      codeRotation(s, i);
+      codePlace(shapeBits(q_, i).position, keys[k], i);
+    }
+  }
+
+ private:
+  static constexpr bool kReads = std::is_same_v<Side, codec::Reader>;
+
+  std::vector<std::uint64_t> keysOf(Run run) const {
+    std::vector<std::uint64_t> keys(run.count);
+    if constexpr (!kReads)
+      for (std::size_t k = 0; k < run.count; ++k) keys[k] = keyOf(run.first + k);
+    return keys;
+  }
+
+  [[nodiscard]] std::uint64_t keyOf(std::size_t i) const {
+    const AxisBits bits = shapeBits(q_, i).position;
+    std::uint64_t key = 0;
+    for (std::size_t a = 0; a < 3; ++a) key |= spreadBits(q_.position[a][i] >> bits[a]) << a;
+    return key;
+  }
+
+  std::uint32_t codeCoarse(codec::NumberModel& model, std::uint32_t value) {
+    const std::uint32_t coarse = model.code(sides_[1], value);
+    require(coarse <= Lattice::kMaxCoarseScale, "a scale");
+    return coarse;
+  }
+
+  CoarseScales codeCoarseScales(std::size_t i) {
+    CoarseScales s{};
+    if constexpr (!kReads) s = coarseScales(q_, i);
+    s.low = codeCoarse(low_[context(lowBefore_)], s.low);
+    s.middle = codeCoarse(middle_[context(s.low)], s.middle);
+    s.high = codeCoarse(high_[context(s.low + s.middle)], s.high);
+    lowBefore_ = s.low;
+    return s;
+  }
+
+  void codeIntensity(const CoarseScales& s, std::size_t i) {
+    std::int32_t& value = q_.intensity[i];
+    bool negative = value < 0;
+    if (q_.lattice.signedIntensity) negative = sides_[3].bit(sign_, negative);
+    const auto written = std::uint32_t(value < 0 ? -1 - value : value);
+    const std::uint32_t magnitude = magnitude_[sizeContext(s)].code(sides_[3], written);
+    require(magnitude <= Lattice::kMaxIntensity, "an intensity");
+    value = negative ? -1 - std::int32_t(magnitude) : std::int32_t(magnitude);
+  }
+
+  void codePrecision(std::size_t i) {
+    const std::int32_t value = q_.intensity[i];
+    const auto magnitude = std::uint32_t(value < 0 ? -1 - value : value);
+    auto& model = precision_[std::size_t(std::bit_width(magnitude))];
+    q_.precision[i] = std::uint8_t(model.code(sides_[3], q_.precision[i]));
+  }
+
+  void codeScaleRests(const CoarseScales& s, std::size_t i) {
+    const int bits = scaleBits(q_.lattice, q_.precision[i]);
+    const std::uint32_t coarse[] = {s.low, s.middle, s.high};
+    for (std::size_t a = 0; a < 3; ++a) {
+      std::uint32_t rest = bits > 0 ? q_.scale[a][i] & ((1u << bits) - 1u) : 0u;
+      rest = codeRest(a, coarse[a], rest, bits);
+      q_.scale[a][i] = coarse[a] << bits | rest;
+    }
+  }
+
+  /// Codes the lower bits of a scale. The highest one has a model; the others are as good as random
+  /// and are stored raw.
+  std::uint32_t codeRest(std::size_t axis, std::uint32_t coarse, std::uint32_t rest, int bits) {
+    if (bits == 0) return 0;
+    const std::uint32_t top =
+        sides_[1].bit(rest_[axis][context(coarse)], (rest >> (bits - 1)) & 1u) ? 1u : 0u;
+    return top << (bits - 1) | sides_[1].raw(rest & ((1u << (bits - 1)) - 1u), bits - 1);
+  }
+
+  void codeRotation(const CoarseScales& s, std::size_t i) {
+    const int coarse = coarseRotationBits(q_.lattice, q_.precision[i], s);
+    RotationCodes known{};
+    for (std::size_t a = 0; a < 3; ++a) known[a] = codeCoarseRotation(a, coarse, i);
+    const AxisBits bits = rotationBits(q_.lattice, q_.precision[i], s, known);
+    for (std::size_t a = 0; a < 3; ++a) {
+      const int below = Lattice::kMaxRotationBits - bits[a], rest = bits[a] - coarse;
+      const auto written = std::uint32_t(q_.rotation[a][i] >> below) & ((1u << rest) - 1u);
+      q_.rotation[a][i] = std::uint16_t(known[a] | sides_[2].raw(written, rest) << below);
+    }
+  }
+
+  std::uint16_t codeCoarseRotation(std::size_t axis, int bits, std::size_t i) {
+    constexpr int kTop = Lattice::kMaxRotationBits;
+    std::uint32_t node = 1;
+    for (int b = 1; b <= bits; ++b) {
+      const bool bit = (q_.rotation[axis][i] >> (kTop - b)) & 1u;
+      node = node << 1 | std::uint32_t(sides_[2].bit(rotation_[axis][node], bit));
+    }
+    return std::uint16_t((node - (1u << bits)) << (kTop - bits));
+  }
+
+  void codePlace(const AxisBits& bits, std::uint64_t key, std::size_t i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      const std::uint32_t place = q_.position[a][i] & ((1u << bits[a]) - 1u);
+      q_.position[a][i] = gatherBits(key >> a) << bits[a] | sides_[0].raw(place, bits[a]);
+    }
+  }
+
+  static constexpr std::size_t kWidths = 32;
+
+  std::array<Side, kStreams>& sides_;
+  QuantisedEllipsoids& q_;
+  std::uint32_t lowBefore_ = 0;  ///< low scale of the previous ellipsoid, often a similar one
+  std::array<codec::NumberModel, kContexts> low_, middle_, high_;
+  std::array<std::array<codec::BitModel, kContexts>, 3> rest_;
+  std::array<std::array<codec::BitModel, std::size_t{1} << kMaxCoarseRotationBits>, 3> rotation_;
+  codec::BitModel sign_;
+  std::array<codec::NumberModel, kSizes> magnitude_;
+  std::array<codec::TreeModel<4>, kWidths> precision_;
+};
+
+}  // namespace
+
+std::vector<Run> blockRuns(std::size_t count, std::span<const std::size_t> layerEnds) {
+  std::vector<Run> runs;
+  if (layerEnds.empty())
+    for (std::size_t first = 0; first < count; first += kBlockEllipsoids)
+      runs.push_back({first, std::min(kBlockEllipsoids, count - first)});
+  std::size_t first = 0;
+  for (const std::size_t end : layerEnds) {
+    const std::size_t size = end - first;
+    const std::size_t blocks = (size + kLayerBlockEllipsoids - 1) / kLayerBlockEllipsoids;
+    const auto begin = [&](std::size_t k) { return first + size * k / blocks; };
+    for (std::size_t k = 0; k < blocks; ++k) runs.push_back({begin(k), begin(k + 1) - begin(k)});
+    first = end;
+  }
+  return runs;
+}
+
+void padForEllipsoids(ByteWriter& out, std::size_t count) {
+  out.padTo(std::max(out.size(), (count + kMaxEllipsoidsPerByte - 1) / kMaxEllipsoidsPerByte));
+}
+
+void checkCount(const ByteReader& in, std::uint64_t stored, std::uint64_t count,
+                std::uint64_t bytes) {
+  if (stored != count || count / kMaxEllipsoidsPerByte > bytes)
+    in.fail(counted(bytes, "byte") + " of content with " + counted(stored, "ellipsoid") + " for " +
+            std::to_string(count));
+}
+
+BlockStreams encodeBlock(QuantisedEllipsoids& q, Run run) {
+  std::array<codec::Writer, kStreams> writers;
+  BlockCoder<codec::Writer>(writers, q).code(run);
+  BlockStreams streams;
+  for (std::size_t s = 0; s < kStreams; ++s) streams[s] = writers[s].coder.finish();
+  return streams;
+}
+
+std::vector<BlockStreams> encodeBlocks(QuantisedEllipsoids q) {
+  const std::vector<Run> runs = blockRuns(q);
+  std::vector<BlockStreams> blocks(runs.size());
+  // The coder writes each value that it reads back to `q`, and each block only to its own run.
+  parallelFor(std::size_t{0}, runs.size(),
+              [&](std::size_t b) { blocks[b] = encodeBlock(q, runs[b]); });
+  return blocks;
+}
+
+void decodeBlock(const BlockBytes& streams, Run run, QuantisedEllipsoids& q) {
+  std::array<codec::Reader, kStreams> readers{codec::Reader{codec::RangeDecoder(streams[0])},
+                                              codec::Reader{codec::RangeDecoder(streams[1])},
+                                              codec::Reader{codec::RangeDecoder(streams[2])},
+                                              codec::Reader{codec::RangeDecoder(streams[3])}};
+  BlockCoder<codec::Reader>(readers, q).code(run);
+}
+
+}  // namespace format
+
+// ---- Bytes of layers and streams
+
+namespace {
+
+std::size_t layersOf(const QuantisedEllipsoids& q) {
+  return q.layerEnds.empty() ? std::min<std::size_t>(q.size(), 1) : q.layerEnds.size();
+}
+
+std::uint64_t bytesOf(const format::BlockStreams& block) {
+  return std::accumulate(block.begin(), block.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const auto& s) { return sum + s.size(); });
+}
+
+void addLayers(const QuantisedEllipsoids& q, std::vector<LayerSize>& sizes) {
+  const auto runs = format::blockRuns(q);
+  const auto blocks = format::encodeBlocks(q);
+  std::size_t layer = 0;
+  for (std::size_t b = 0; b < runs.size(); ++b) {
+    if (!q.layerEnds.empty() && runs[b].first == q.layerEnds[layer]) ++layer;
+    sizes[layer].ellipsoids += runs[b].count;
+    sizes[layer].bytes += bytesOf(blocks[b]);
+  }
+}
+
+}  // namespace
+
+std::size_t layerCount(const StoredGrid& grid) {
+  if (grid.quantised.empty()) return std::min<std::size_t>(grid.field.ellipsoidCount(), 1);
+  std::size_t layers = 0;
+  for (const auto& chunk : grid.quantised) layers = std::max(layers, layersOf(chunk));
+  return layers;
+}
+
+std::vector<LayerSize> layerSizes(const StoredGrid& grid) {
+  std::vector<LayerSize> sizes(grid.quantised.empty() ? 0 : layerCount(grid));
+  for (const auto& chunk : grid.quantised) addLayers(chunk, sizes);
+  return sizes;
+}
+
+StreamBytes streamBytes(const StoredGrid& grid) {
+  StreamBytes bytes;
+  for (const auto& chunk : grid.quantised) {
+    for (const auto& block : format::encodeBlocks(chunk)) {
+      bytes.positions += block[0].size();
+      bytes.scales += block[1].size();
+      bytes.rotations += block[2].size();
+      bytes.intensities += block[3].size();
+    }
+  }
+  return bytes;
+}
+
+}  // namespace esvr
 
 namespace esvr::format {
 

@@ -12,11 +12,10 @@
 #include "core/atomic_file.h"
 #include "esvr/container.h"
 #include "esvr/grid.h"
-#include "format/activity_sections.h"
 #include "format/ellipsoid_sections.h"
 #include "format/non_finite_section.h"
-#include "format/predicted_sections.h"
 #include "format/records.h"
+#include "format/voxel_sections.h"
 
 namespace esvr {
 

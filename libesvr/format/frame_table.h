@@ -16,8 +16,6 @@ namespace esvr::format {
 /// The first byte; no file begins with it.
 inline constexpr std::byte kFrameMark{0x46};
 
-/// Largest number of bytes of the short form besides the contents of its sections and their rows.
-inline constexpr std::uint64_t kFrameHeadBytes = 20;
 /// Largest number of bytes that a section takes besides its content if numbers of grids, chunks and
 /// contents are below 2^14.
 inline constexpr std::uint64_t kFrameRowBytes = 24;

@@ -14,7 +14,7 @@
 #include "field/evaluate.h"
 #include "field/voxel_rule.h"
 #include "format/grid_rule.h"
-#include "format/voxel_section.h"
+#include "format/voxel_sections.h"
 
 namespace esvr {
 

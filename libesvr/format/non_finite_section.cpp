@@ -11,7 +11,7 @@
 
 #include "core/geometry.h"
 #include "esvr/error.h"
-#include "format/voxel_section.h"
+#include "format/voxel_sections.h"
 
 namespace esvr::format {
 namespace {

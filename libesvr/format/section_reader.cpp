@@ -4,8 +4,8 @@
 #include <set>
 
 #include "esvr/error.h"
-#include "format/carried_bytes.h"
 #include "format/frame_table.h"
+#include "format/section_table.h"
 
 namespace esvr::format {
 

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "codec/byte_coder.h"
+#include "codec/range_coder.h"
 #include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/error.h"

@@ -1,7 +1,7 @@
 #pragma once
 /// Where everything is in a file: the numbers that docs/format.md specifies, the header, the section table and its
 /// checks, and the codecs in which sections are stored. The bytes of carried grids have a codec of their own
-/// (carried_bytes.h).
+/// (PackedCarried).
 
 #include <array>
 #include <compare>
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "esvr/container.h"
+#include "esvr/volume.h"
 #include "format/bytes.h"
 
 namespace esvr::format {
@@ -198,5 +199,22 @@ void checkStored(const ByteSource& source, const SectionTable& table, std::size_
 /// Reads the content of a section. \throws BadInput
 [[nodiscard]] std::vector<std::byte> readSection(const ByteSource& source,
                                                  const SectionTable& table, std::size_t entry);
+
+// ---- The bytes of carried grids. They may be too large for the heap, and Blosc compresses them
+
+/// Bytes as they are stored in the file.
+struct PackedCarried {
+  Codec codec = Codec::kRaw;
+  VoxelArray<std::byte> bytes;
+};
+
+/// Compresses bytes if that saves enough of them. The result is in the same memory.
+[[nodiscard]] PackedCarried packCarried(const VoxelArray<std::byte>& raw);
+
+/// Reads the content of a section into an array of this memory, piece by piece, so that its stored bytes
+/// need not be in memory. The decoder-only build, which has no Blosc, throws RuntimeFailure instead.
+/// \throws BadInput
+[[nodiscard]] VoxelArray<std::byte> readCarried(const ByteSource& source, const SectionTable& table,
+                                                std::size_t entry, const VoxelMemory& memory);
 
 }  // namespace esvr::format

@@ -4,9 +4,9 @@
 #include <bit>
 
 #include "format/bytes.h"
-#include "format/carried_bytes.h"
 #include "format/frame_table.h"
-#include "format/voxel_section.h"
+#include "format/section_table.h"
+#include "format/voxel_sections.h"
 
 namespace esvr::format {
 namespace {

@@ -1,7 +1,5 @@
 #include "render/cell_bricks.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <iterator>
 #include <tuple>

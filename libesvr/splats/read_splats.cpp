@@ -18,7 +18,7 @@
 #include "core/read_input.h"
 #include "esvr/error.h"
 #include "esvr/splats.h"
-#include "splats/file_words.h"
+#include "splats/gaussian.h"
 
 namespace esvr {
 namespace {

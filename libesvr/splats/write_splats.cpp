@@ -10,7 +10,7 @@
 #include "core/atomic_file.h"
 #include "core/parallel.h"
 #include "esvr/splats.h"
-#include "splats/file_words.h"
+#include "splats/gaussian.h"
 
 namespace esvr {
 namespace {

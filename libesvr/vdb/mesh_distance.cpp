@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "vdb/formats.h"
 #include "vdb/properties.h"
-#include "vdb/write_vdb.h"
 
 namespace esvr::vdb {
 namespace {

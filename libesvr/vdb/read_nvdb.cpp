@@ -1,4 +1,4 @@
-#include "vdb/readers.h"
+#include "vdb/formats.h"
 
 #include <blosc.h>
 #include <zlib.h>

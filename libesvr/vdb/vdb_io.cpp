@@ -13,9 +13,8 @@
 #include "esvr/grid.h"
 #include "vdb/archive.h"
 #include "vdb/files.h"
-#include "vdb/readers.h"
+#include "vdb/formats.h"
 #include "vdb/write_nvdb.h"
-#include "vdb/write_vdb.h"
 
 namespace esvr::vdb {
 namespace {

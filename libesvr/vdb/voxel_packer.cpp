@@ -11,8 +11,8 @@
 #include "core/add_seconds.h"
 #include "esvr/error.h"
 #include "vdb/files.h"
+#include "vdb/formats.h"
 #include "vdb/write_nvdb.h"
-#include "vdb/write_vdb.h"
 
 namespace esvr::vdb {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "esvr/error.h"
 #include "esvr/grid.h"
-#include "vdb/write_vdb.h"
+#include "vdb/formats.h"
 
 #include ESVR_NANOVDB_CREATE
 

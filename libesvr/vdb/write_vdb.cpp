@@ -1,4 +1,4 @@
-#include "vdb/write_vdb.h"
+#include "vdb/formats.h"
 
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>

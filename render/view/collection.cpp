@@ -6,7 +6,7 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/vdb_io.h"
-#include "programs/names.h"
+#include "programs/option_values.h"
 #include "programs/sequence.h"
 
 namespace esvr::view {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "esvr/sequence_file.h"
-#include "programs/frames.h"
+#include "programs/sequence.h"
 #include "render/scene.h"
 #include "render/view/requests.h"
 

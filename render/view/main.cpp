@@ -20,12 +20,9 @@
 #include "esvr/error.h"
 #include "esvr/render.h"
 #include "programs/command_line.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
 #include "programs/video_file.h"
-#include "programs/workers.h"
-#include "render/view/page.h"
 #include "render/view/server.h"
 
 extern char** environ;

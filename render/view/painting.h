@@ -1,11 +1,14 @@
 #pragma once
-/// A picture of a scene while it is drawn.
+/// A picture of a scene while it is drawn, and as a JPEG file.
 
 #include <memory>
 #include <optional>
+#include <string>
 
+#include "esvr/image.h"
 #include "esvr/image_metrics.h"
 #include "esvr/render.h"
+#include "esvr/transfer_function.h"
 #include "render/view/collection.h"
 #include "render/view/requests.h"
 
@@ -70,5 +73,16 @@ class Painting {
   Part own_;
   std::optional<Part> reference_;
 };
+
+// ---- JPEG files
+
+struct JpegForm {
+  Rgb background;         ///< color behind the picture
+  double quality = 0.85;  ///< 0 to 1
+};
+
+/// Encodes a picture in sRGB, with colors at full resolution.
+/// \throws RuntimeFailure  with the message of libjpeg
+[[nodiscard]] std::string encodeJpeg(const Image& image, const JpegForm& form);
 
 }  // namespace esvr::view

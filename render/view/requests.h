@@ -14,8 +14,8 @@
 #include "esvr/camera.h"
 #include "esvr/error.h"
 #include "esvr/transfer_function.h"
-#include "programs/frames.h"
 #include "programs/option_values.h"
+#include "programs/sequence.h"
 #include "render/options.h"
 
 namespace esvr::view {

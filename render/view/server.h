@@ -1,19 +1,108 @@
 #pragma once
-/// The viewer's server as a whole, and what its clients may take.
+/// The pages: the viewer that the server gives to browsers, and pages that need no server, because
+/// they contain the file and draw it themselves.
+/// The viewer's server: what a request gets, by rules, without a socket and with the secret in the server's address; and the
+/// server as a whole, and what its clients may take.
 
 #include <algorithm>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/status.hpp>
+#include <boost/beast/http/string_body.hpp>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "programs/resources.h"
 #include "render/view/desk.h"
-#include "render/view/request_rules.h"
 #include "render/view/studio.h"
 
 namespace esvr::view {
+
+/// The viewer as one HTML file.
+[[nodiscard]] std::string_view viewPage();
+
+/// The viewer that draws by itself, without a file in it.
+[[nodiscard]] std::string_view exportPageBundle();
+
+/// The largest file in a page, in bytes. Base64 makes it a third larger, and browsers have limits
+/// on the length of a text.
+inline constexpr std::uintmax_t kMostExportedBytes = std::uintmax_t{256} << 20;
+
+/// The page for exported files with a file in it.
+/// \param page   as exportPageBundle()
+/// \param name   of the file, which the page shows
+/// \param bytes  of the file
+/// \throws std::logic_error  the page has no place for a file
+[[nodiscard]] std::string exportedPage(std::string_view page, const std::string& name,
+                                       std::string_view bytes);
+
+/// What is to be exported.
+struct Export {
+  std::filesystem::path input, output;
+  bool overwrite = false;
+  cli::HostMemory memory;  ///< memory that reading the input may take
+};
+
+/// Writes the page of a file.
+/// \throws UsageError      the input is no .esvr file of one frame, or is too large for a page; the
+///                         output is no .html file
+/// \throws BadInput, MemoryExceeded  as for showFile
+/// \throws RuntimeFailure  as for cli::writeBytes
+void exportPage(const Export& what);
+
+// ---- The rules of requests
+
+namespace http = boost::beast::http;
+using Request = http::request<http::empty_body>;
+
+/// What the server accepts.
+struct Site {
+  std::string token;
+  /// Names that a Host header may have besides localhost and addresses. An address cannot be the
+  /// name of another site that resolves to this machine (DNS rebinding).
+  std::vector<std::string> hostNames;
+};
+
+enum class Target { kPage, kSocket, kNothing };
+
+struct Verdict {
+  Target target = Target::kNothing;
+  http::status status = http::status::not_found;  ///< of the answer if there is no target
+};
+
+/// Decides what a request gets.
+[[nodiscard]] Verdict judge(const Request& request, const Site& site);
+
+using Response = http::response<http::string_body>;
+
+/// The page, with a policy that lets only its own scripts run and lets it speak to this server
+/// only.
+/// \param host  the Host header of the request, which judge() has accepted
+/// \param page  its scripts and styles have kNoncePlace as their nonce
+[[nodiscard]] Response pageResponse(std::string_view page, std::string_view host);
+/// The text that is replaced by a random nonce.
+inline constexpr std::string_view kNoncePlace = "ESVR-NONCE";
+
+/// An answer with nothing but a status.
+[[nodiscard]] Response statusResponse(http::status status);
+
+/// 128 random bits of the system as 32 hexadecimal digits.
+[[nodiscard]] std::string randomToken();
+
+/// Compares in a time that does not depend on where the texts differ, so that the time of an answer
+/// tells nothing about the token.
+[[nodiscard]] bool sameSecret(std::string_view a, std::string_view b);
+
+// ---- The server
 
 /// What clients may take.
 struct ServerLimits {

@@ -7,7 +7,7 @@
 #include "esvr/device.h"
 #include "esvr/error.h"
 #include "programs/run_main.h"
-#include "render/view/jpeg_file.h"
+#include "render/view/painting.h"
 
 namespace esvr::view {
 

@@ -1,5 +1,7 @@
 #pragma once
-/// The samples by name: generated volumes with their grids and metadata.
+/// The five synthetic volumes on which the paper compares kinds of ellipsoids (appendix, 'Ellipsoid
+/// Type Comparison'). The paper shows slices and gives no formulas; these volumes are similar.
+/// And the samples by name: generated volumes with their grids and metadata.
 
 #include <span>
 #include <string>
@@ -7,9 +9,27 @@
 
 #include "esvr/grid.h"
 #include "esvr/vdb_io.h"
+#include "esvr/volume.h"
 #include "generators/voxelise.h"
 
 namespace esvr::samples {
+
+/// 8area: a dense volume in eight chunks of different density, each varying smoothly.
+[[nodiscard]] SparseVolume makeEightAreas(const SampleOptions& options);
+
+/// EmptySphere: a thin shell.
+[[nodiscard]] SparseVolume makeEmptySphere(const SampleOptions& options);
+
+/// SynthTube: straight tubes of different thickness.
+[[nodiscard]] SparseVolume makeSynthTube(const SampleOptions& options);
+
+/// SynthWiggle: thin tubes that wind around their axes.
+[[nodiscard]] SparseVolume makeSynthWiggle(const SampleOptions& options);
+
+/// DiffuseScalar: a ball that fades out over most of its radius.
+[[nodiscard]] SparseVolume makeDiffuseScalar(const SampleOptions& options);
+
+// ---- Kinds of samples
 
 inline constexpr double kWorldSize = 10.0;  ///< a sample's longest side in world units
 

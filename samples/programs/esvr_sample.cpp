@@ -9,10 +9,9 @@
 #include "generators/sample_kinds.h"
 #include "programs/command_line.h"
 #include "programs/files.h"
-#include "programs/frames.h"
-#include "programs/messages.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
-#include "programs/workers.h"
+#include "programs/sequence.h"
 #include "sample_output.h"
 
 namespace {

@@ -9,8 +9,8 @@
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/vdb_io.h"
-#include "programs/memory.h"
-#include "programs/messages.h"
+#include "programs/resources.h"
+#include "programs/run_main.h"
 
 namespace esvr::samples {
 

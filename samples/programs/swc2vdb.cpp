@@ -8,12 +8,11 @@
 #include <vector>
 
 #include "generators/sample_kinds.h"
-#include "generators/skeleton.h"
 #include "generators/tubes.h"
 #include "programs/command_line.h"
 #include "programs/files.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
-#include "programs/workers.h"
 #include "sample_output.h"
 
 namespace {

@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "cli/converters.h"
+#include "cli/conversion.h"
 #include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 

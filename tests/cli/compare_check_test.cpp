@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "cli/compare_fixture.h"
+#include "cli/conversion.h"
 #include "vdb/open_vdb.h"
 
 #include <openvdb/io/File.h>

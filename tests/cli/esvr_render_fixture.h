@@ -1,8 +1,10 @@
 #pragma once
+/// Reads the pictures of a program with libpng.
 /// The folder of a test of esvr-render.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <png.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "cli/png_pixels.h"
 #include "cli/run_program.h"
 #include "esvr/container.h"
 #include "esvr/field.h"
@@ -20,6 +21,36 @@
 #include "field/random_field.h"
 
 namespace esvr::test {
+
+struct Pixels {
+  png_image header{};
+  std::vector<png_byte> rgba;
+
+  [[nodiscard]] const png_byte* at(int column, int row) const {
+    return &rgba[4 * (std::size_t(row) * header.width + column)];
+  }
+  [[nodiscard]] std::vector<png_byte> corner() const { return {at(0, 0), at(0, 0) + 4}; }
+};
+
+inline Pixels readPng(const std::filesystem::path& path) {
+  Pixels p;
+  p.header.version = PNG_IMAGE_VERSION;
+  EXPECT_NE(png_image_begin_read_from_file(&p.header, path.c_str()), 0) << p.header.message;
+  EXPECT_EQ(p.header.format, png_uint_32(PNG_FORMAT_RGBA)) << "8 bits, with alpha";
+  p.header.format = PNG_FORMAT_RGBA;
+  p.rgba.resize(PNG_IMAGE_SIZE(p.header));
+  EXPECT_NE(png_image_finish_read(&p.header, nullptr, p.rgba.data(), 0, nullptr), 0);
+  return p;
+}
+
+inline double psnrOf(const Pixels& a, const Pixels& b) {
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.rgba.size(); ++i)
+    squares += std::pow((a.rgba[i] - b.rgba.at(i)) / 255.0, 2);
+  return -10.0 * std::log10(squares / double(a.rgba.size()));
+}
+
+// ---- The folder of a test
 
 /// A folder with a blob of ellipsoids, `in.esvr`, and with its voxels, `in.vdb`.
 class EsvrRender : public testing::Test {

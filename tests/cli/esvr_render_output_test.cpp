@@ -10,7 +10,7 @@
 
 #include "cli/esvr_render_fixture.h"
 #include "esvr/transfer_function.h"
-#include "support/search_path.h"
+#include "support/files.h"
 
 namespace esvr::test {
 namespace {

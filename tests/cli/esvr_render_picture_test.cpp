@@ -6,7 +6,7 @@
 
 #include "cli/esvr_render_fixture.h"
 #include "esvr/quantised.h"
-#include "support/on_device.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 namespace {

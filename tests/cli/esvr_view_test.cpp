@@ -8,12 +8,12 @@
 #include <regex>
 #include <thread>
 
-#include "cli/png_pixels.h"
+#include "cli/esvr_render_fixture.h"
 #include "cli/run_program.h"
 #include "esvr/device.h"
-#include "programs/page.h"
+#include "programs/page_figures.h"
 #include "render/view/view_client.h"
-#include "support/search_path.h"
+#include "support/files.h"
 
 namespace esvr::test {
 namespace {

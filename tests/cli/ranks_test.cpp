@@ -9,7 +9,7 @@
 #include <iterator>
 #include <thread>
 
-#include "cli/converters.h"
+#include "cli/conversion.h"
 
 namespace esvr::test {
 namespace {

@@ -113,15 +113,4 @@ ProgramRun succeeded(ProgramRun run, const char* file, int line) {
   throw std::runtime_error(message.str());
 }
 
-void writeText(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
-}
-
-std::string readText(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-}
-
 }  // namespace esvr::test

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "support/files.h"
 #include "support/messages.h"
-#include "support/temporary_folder.h"
 
 namespace esvr::test {
 
@@ -91,9 +91,6 @@ inline ProgramRun runShell(const std::string& line) { return runProgram("/bin/sh
 /// contains `sign`.
 ProgramRun runInterrupted(const std::filesystem::path& program, const Words& arguments,
                           const std::string& sign = "");
-
-void writeText(const std::filesystem::path& path, const std::string& text);
-[[nodiscard]] std::string readText(const std::filesystem::path& path);
 
 class FolderTest : public testing::Test {
  protected:

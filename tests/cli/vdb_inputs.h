@@ -75,8 +75,8 @@ inline std::vector<std::string> namesIn(const std::string& path) {
 }
 
 /// The grids of a .vdb file as bytes, without their places and the version of the format.
-inline std::vector<CarriedGrid> bytesIn(const std::string& path,
-                                        std::vector<std::size_t> places = {}) {
+inline std::vector<CarriedGrid> carriedIn(const std::string& path,
+                                          std::vector<std::size_t> places = {}) {
   if (places.empty()) {
     places.resize(inspectVdb(path).grids.size());
     std::iota(places.begin(), places.end(), std::size_t{0});

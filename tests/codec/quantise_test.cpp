@@ -9,10 +9,9 @@
 
 #include <cmath>
 
-#include "../field/random_field.h"
 #include "codec/lattice.h"
-#include "codec/quantise.h"
 #include "esvr/error.h"
+#include "field/random_field.h"
 
 namespace esvr {
 namespace {

@@ -21,14 +21,11 @@
 #include <vector>
 
 #include "core/cuda/runtime.h"
-#include "support/on_device.h"
+#include "support/machine.h"
+#include "support/messages.h"
 
 namespace esvr::cuda {
 namespace {
-
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 static_assert(!std::is_copy_constructible_v<DeviceBuffer<float>>);
 static_assert(!std::is_copy_assignable_v<DeviceBuffer<float>>);
@@ -37,9 +34,8 @@ static_assert(std::is_nothrow_move_constructible_v<DeviceBuffer<float>>);
 TEST(Check, PassesSuccessAndThrowsCudasOwnTextWithThePlace) {
   EXPECT_NO_THROW(check(cudaSuccess, "adding"));
   EXPECT_THAT([] { check(cudaErrorInvalidValue, "adding"); },
-              ThrowsMessage<DeviceError>(AllOf(HasSubstr("adding"), HasSubstr("invalid argument"),
-                                               HasSubstr("cudaErrorInvalidValue"),
-                                               HasSubstr("device_buffer_test.cpp:"))));
+              test::ThrowsSaying<DeviceError>("adding", "invalid argument", "cudaErrorInvalidValue",
+                                              "device_buffer_test.cpp:"));
 }
 
 TEST(DeviceBuffer, OfNoElementsNeedsNoDevice) {
@@ -61,7 +57,7 @@ TEST_F(DeviceBufferOnGpu, SaysHowMuchWasAskedForWhenMemoryIsOut) {
   // No device has 2^50 bytes, and 2^63 elements of 8 bytes exceed size_t.
   for (const std::size_t n : {std::size_t{1} << 47, std::size_t{1} << 63})
     EXPECT_THAT([&] { DeviceBuffer<double>(n, stream->get()); },
-                ThrowsMessage<DeviceError>(HasSubstr(std::to_string(n) + " times 8 bytes")));
+                test::ThrowsSaying<DeviceError>(std::to_string(n) + " times 8 bytes"));
   // Later calls must not report this failure again.
   EXPECT_NO_THROW(check(cudaGetLastError(), "nothing"));
 }
@@ -72,7 +68,7 @@ TEST(MemoryAccount, RefusesWhatGoesBeyondItsLimit) {
   MemoryAccount account;
   account.setLimit(100);
   account.take(60);
-  EXPECT_THAT([&] { account.take(41); }, ThrowsMessage<DeviceMemoryError>(HasSubstr("41 bytes")));
+  EXPECT_THAT([&] { account.take(41); }, test::ThrowsSaying<DeviceMemoryError>("41 bytes"));
   EXPECT_EQ(account.held(), 60u);
   account.take(40);
   account.give(100);
@@ -187,7 +183,7 @@ TEST(Count32, RefusesByNameWhatKernelsCannotNumber) {
   EXPECT_EQ(count32(kMaxCount32, "pairs"), kMaxCount32);
   for (const std::size_t n : {kMaxCount32 + 1, std::size_t{1} << 32, (std::size_t{1} << 32) + 5})
     EXPECT_THAT([&] { (void)count32(n, "pairs"); },
-                ThrowsMessage<DeviceError>(HasSubstr(std::to_string(n) + " pairs")));
+                test::ThrowsSaying<DeviceError>(std::to_string(n) + " pairs"));
 }
 
 }  // namespace

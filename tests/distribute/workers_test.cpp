@@ -4,6 +4,9 @@
 //
 // A rank fits the parts that it is handed and gets the results of the others. It uses and fills a store.
 // Ranks that do not agree end with an error. A process that was not started with others has no ranks.
+//
+// A store gives back what was put, also to a later process. It refuses damaged results, another
+// origin, and a process that wants it while another one uses it.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,14 +14,61 @@
 #include <atomic>
 #include <barrier>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "distribute/fake_parts.h"
 #include "esvr/error.h"
+#include "esvr/fit.h"
 #include "esvr/workers.h"
-#include "support/temporary_folder.h"
+#include "support/files.h"
+#include "support/messages.h"
+
+namespace esvr::test {
+
+inline PartKey keyOfPart(std::size_t part) { return {part, 7}; }
+
+/// The result of part p is p + 1 bytes of the value p.
+inline std::vector<std::byte> resultOfPart(std::size_t part) {
+  return std::vector<std::byte>(part + 1, std::byte(part));
+}
+
+/// Parts that take no time.
+class FakeParts : public RoundParts {
+ public:
+  /// \param during  is called by each fit
+  explicit FakeParts(std::size_t count, std::function<void(std::size_t)> during = {})
+      : fits_(count), during_(std::move(during)) {}
+
+  [[nodiscard]] int round() const override { return 2; }
+  [[nodiscard]] std::size_t count() const override { return fits_.size(); }
+  [[nodiscard]] PartKey keyOf(std::size_t part) const override { return keyOfPart(part); }
+  [[nodiscard]] PartOutput fit(std::size_t part, const Device&) const override {
+    ++fits_[part];
+    if (during_) during_(part);
+    return {resultOfPart(part), complete};
+  }
+  /// The number of fits of each part.
+  [[nodiscard]] std::vector<int> fits() const { return {fits_.begin(), fits_.end()}; }
+
+  bool complete = true;
+
+ private:
+  mutable std::vector<std::atomic<int>> fits_;
+  std::function<void(std::size_t)> during_;
+};
+
+inline std::vector<std::vector<std::byte>> resultsOfParts(std::size_t count) {
+  std::vector<std::vector<std::byte>> results;
+  for (std::size_t p = 0; p < count; ++p) results.push_back(resultOfPart(p));
+  return results;
+}
+
+}  // namespace esvr::test
 
 namespace esvr {
 namespace {
@@ -27,10 +77,7 @@ using test::FakeParts;
 using test::keyOfPart;
 using test::resultOfPart;
 using test::resultsOfParts;
-using testing::AllOf;
 using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 TEST(DeviceWorkers, RunEveryPartOnce) {
   for (const std::size_t devices : {1, 3}) {
@@ -178,7 +225,7 @@ TEST(RankWorkers, UseAndFillAStore) {
 TEST(RankWorkers, EndWhereTheyDoNotAgree) {
   TwoRanks ranks(false);
   EXPECT_THAT([&] { (void)RankWorkers(ranks, {Device{}}, nullptr).run(FakeParts(3)); },
-              ThrowsMessage<RuntimeFailure>(HasSubstr("divided the volume differently")));
+              test::ThrowsSaying<RuntimeFailure>("divided the volume differently"));
 }
 
 TEST(RankWorkers, EndWithTheErrorOfAPart) {
@@ -217,9 +264,103 @@ TEST_F(StartedBy, MpirunAloneThereAreNoRanks) {
 TEST_F(StartedBy, MpirunItSaysThatMpiIsMissing) {
   ::setenv("PMIX_RANK", "0", 1);
   ::setenv("OMPI_COMM_WORLD_SIZE", "4", 1);
-  EXPECT_THAT(
-      [] { (void)joinRanks(); },
-      ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr("one of 4"), HasSubstr("MPI cannot be used"))));
+  EXPECT_THAT([] { (void)joinRanks(); },
+              test::ThrowsSaying<RuntimeFailure>("one of 4", "MPI cannot be used"));
+}
+
+}  // namespace
+}  // namespace esvr
+
+// ---- The store of results
+
+namespace esvr {
+namespace {
+
+using Access = PartStore::Access;
+using test::keyOfPart;
+using test::resultOfPart;
+
+class PartStoreTest : public testing::Test {
+ protected:
+  [[nodiscard]] std::string path() const { return folder_ / "parts"; }
+  [[nodiscard]] std::string onlyResult() const {
+    for (const auto& entry : std::filesystem::directory_iterator(path()))
+      if (entry.path().extension() == ".part") return entry.path();
+    return {};
+  }
+  std::vector<PartOrigin> origin_{{"input", "a.vdb"}, {"count", "300"}};
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(PartStoreTest, GivesBackWhatWasPutAlsoLater) {
+  {
+    PartStore store(path(), origin_, Access::kAlone);
+    EXPECT_FALSE(store.find(keyOfPart(1)).has_value());
+    store.put(keyOfPart(1), resultOfPart(1));
+    store.put(keyOfPart(2), {});
+  }
+  const PartStore store(path(), origin_, Access::kAlone);
+  EXPECT_EQ(store.find(keyOfPart(1)), resultOfPart(1));
+  EXPECT_EQ(store.find(keyOfPart(2)), std::vector<std::byte>{});
+  EXPECT_FALSE(store.find(keyOfPart(3)).has_value());
+}
+
+TEST_F(PartStoreTest, RefusesADamagedResultAndNamesIt) {
+  PartStore store(path(), origin_, Access::kAlone);
+  for (const auto offset : {0, 9, 17, 26}) {  // magic, size, hash and content
+    store.put(keyOfPart(5), resultOfPart(5));
+    std::fstream file(onlyResult(), std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(offset);
+    file.put('!');
+    file.close();
+    EXPECT_THAT([&] { (void)store.find(keyOfPart(5)); },
+                test::ThrowsSaying<BadInput>(onlyResult() + " is damaged"))
+        << offset;
+  }
+  std::filesystem::resize_file(onlyResult(), 10);
+  EXPECT_THROW((void)store.find(keyOfPart(5)), BadInput);
+}
+
+TEST_F(PartStoreTest, RefusesAnotherOriginAndNamesBoth) {
+  { const PartStore store(path(), origin_, Access::kAlone); }
+  const auto open = [&](std::vector<PartOrigin> origin) {
+    return [this, origin] { const PartStore store(path(), origin, Access::kAlone); };
+  };
+  EXPECT_THAT(open({{"input", "b.vdb"}, {"count", "300"}}),
+              test::ThrowsSaying<BadInput>("its input is a.vdb, not b.vdb"));
+  EXPECT_THAT(open({{"input", "a.vdb"}, {"count", "30"}}),
+              test::ThrowsSaying<BadInput>("its count is 300, not 30"));
+  EXPECT_THAT(open({{"input", "a.vdb"}, {"count", "300"}, {"seed", "1"}}),
+              test::ThrowsSaying<BadInput>("its seed is unknown"));
+}
+
+TEST_F(PartStoreTest, IsUsedByOneProcessOrSharedBySeveral) {
+  const auto opening = [&](Access access) {
+    return [this, access] { const PartStore store(path(), origin_, access); };
+  };
+  const auto inUse = test::ThrowsSaying<RuntimeFailure>("another process uses");
+  {
+    const PartStore store(path(), origin_, Access::kAlone);
+    EXPECT_THAT(opening(Access::kAlone), inUse);
+    EXPECT_THAT(opening(Access::kShared), inUse);
+  }
+  const PartStore store(path(), origin_, Access::kShared);
+  EXPECT_NO_THROW(opening(Access::kShared)());
+  EXPECT_THAT(opening(Access::kAlone), inUse);
+}
+
+TEST_F(PartStoreTest, RemovesItsFolder) {
+  PartStore store(path(), origin_, Access::kAlone);
+  store.put(keyOfPart(1), resultOfPart(1));
+  store.remove();
+  EXPECT_FALSE(std::filesystem::exists(path()));
+}
+
+TEST_F(PartStoreTest, NamesAFolderThatCannotBeMade) {
+  std::ofstream(folder_ / "file") << "text";
+  const std::string inFile = folder_ / "file/parts";
+  EXPECT_THAT([&] { const PartStore store(inFile, origin_, Access::kAlone); },
+              test::ThrowsSaying<RuntimeFailure>(inFile));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
-#include "support/temporary_folder.h"
+#include "support/files.h"
 
 namespace esvr {
 namespace {

@@ -20,7 +20,7 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "support/temporary_folder.h"
+#include "support/files.h"
 
 namespace esvr {
 namespace {

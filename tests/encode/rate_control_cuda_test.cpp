@@ -10,7 +10,7 @@
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "support/on_device.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {

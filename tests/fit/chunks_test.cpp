@@ -25,13 +25,11 @@
 #include "esvr/fit.h"
 #include "esvr/metrics.h"
 #include "esvr/workers.h"
-#include "fit/chunks/divide.h"
-#include "fit/chunks/fit_in_chunks.h"
-#include "fit/chunks/part.h"
+#include "fit/chunks/chunks.h"
 #include "fit/cpu/cpu_pass.h"
-#include "random_ellipsoids.h"
-#include "support/on_device.h"
-#include "volumes.h"
+#include "fit/gradient_scene.h"
+#include "fit/volumes.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {

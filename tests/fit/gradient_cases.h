@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "gradient_scene.h"
+#include "fit/gradient_scene.h"
 
 namespace esvr::test {
 

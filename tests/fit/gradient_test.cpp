@@ -10,11 +10,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fit/adam.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid.h"
-#include "fit/gradient.h"
-#include "gradient_cases.h"
-#include "random_ellipsoids.h"
+#include "fit/gradient_cases.h"
+#include "fit/gradient_scene.h"
 
 namespace esvr {
 namespace {

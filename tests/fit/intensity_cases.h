@@ -10,8 +10,8 @@
 #include "esvr/field.h"
 #include "esvr/metrics.h"
 #include "fit/intensity_problem.h"
-#include "support/on_device.h"
-#include "volumes.h"
+#include "fit/volumes.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 

@@ -3,7 +3,7 @@
 
 #include <tbb/global_control.h>
 
-#include "intensity_cases.h"
+#include "fit/intensity_cases.h"
 
 namespace esvr {
 namespace {

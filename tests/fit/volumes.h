@@ -5,9 +5,9 @@
 #include <cmath>
 #include <functional>
 
-#include "../field/random_field.h"
 #include "esvr/field.h"
 #include "esvr/volume.h"
+#include "field/random_field.h"
 
 namespace esvr::test {
 

@@ -8,19 +8,19 @@
 #include <functional>
 #include <iterator>
 #include <random>
+#include <stdexcept>
 
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
 #include "format/bytes.h"
-#include "format/crafted_file.h"
 #include "format/encode.h"
 #include "format/non_finite_section.h"
-#include "format/sequence_index.h"
+#include "format/section_table.h"
+#include "format/sequence_file.h"
 #include "support/non_finite.h"
 
 namespace esvr::test {
-
 namespace {
 
 /// Random numbers that are the same on every machine, which the standard's distributions do not
@@ -247,11 +247,6 @@ EsvrFile everything(std::size_t ellipsoids) {
 }
 
 EsvrFile fileOf(StoredGrid grid) { return {{}, {std::move(grid)}}; }
-
-std::vector<std::byte> bytesOf(const std::string& text) {
-  const auto bytes = std::as_bytes(std::span(text));
-  return {bytes.begin(), bytes.end()};
-}
 
 std::string difference(const EsvrFile& a, const EsvrFile& b) {
   if (a.metadata != b.metadata) return "metadata";
@@ -580,14 +575,69 @@ void writeChains(const std::filesystem::path& path,
   writeBytes(path, file);
 }
 
-std::vector<std::byte> bytesIn(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return bytesOf(std::string(std::istreambuf_iterator<char>(in), {}));
+// ---- Files that lie
+
+using namespace format;
+
+CraftedFile::CraftedFile(const std::vector<std::byte>& bytes) {
+  const MemorySource source(bytes, "crafted");
+  const SectionTable table = readTable(source);
+  versionMajor = table.versionMajor;
+  versionMinor = table.versionMinor;
+  for (std::size_t i = 0; i < table.entries.size(); ++i)
+    sections_.push_back({table.entries[i], readStored(source, table, i)});
 }
 
-void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
-  std::ofstream out(path, std::ios::binary | std::ios::trunc);
-  out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+CraftedSection& CraftedFile::section(SectionKind kind) {
+  const auto it = std::find_if(sections_.begin(), sections_.end(),
+                               [kind](const auto& s) { return s.entry.id.kind == kind; });
+  if (it == sections_.end()) throw std::logic_error("no such section in the crafted file");
+  return *it;
+}
+
+void CraftedFile::erase(SectionKind kind) {
+  sections_.erase(sections_.begin() + (&section(kind) - sections_.data()));
+}
+
+CraftedSection& CraftedFile::add(const SectionId& id, std::uint16_t flags,
+                                 std::vector<std::byte> stored) {
+  SectionEntry entry{id, Codec::kRaw, flags, 0, 0, stored.size(), 0};
+  sections_.push_back({entry, std::move(stored)});
+  return sections_.back();
+}
+
+std::vector<std::byte> CraftedFile::content(SectionKind kind) {
+  const auto& s = section(kind);
+  return unpack(s.entry.codec, s.stored, s.entry.rawBytes, "crafted");
+}
+
+void CraftedFile::setContent(SectionKind kind, std::vector<std::byte> raw) {
+  auto& s = section(kind);
+  s.entry.codec = Codec::kRaw;
+  s.entry.rawBytes = raw.size();
+  s.stored = std::move(raw);
+}
+
+std::vector<std::byte> CraftedFile::assemble() {
+  table_ = {versionMajor, versionMinor, 0, kHeaderBytes, {}};
+  std::uint64_t end = kHeaderBytes + sections_.size() * kEntryBytes;
+  for (auto& s : sections_) {
+    s.entry.offset = alignUp(end);
+    s.entry.storedBytes = s.stored.size();
+    s.entry.checksum = checksum(s.stored);
+    end = s.entry.offset + s.entry.storedBytes;
+    table_.entries.push_back(s.entry);
+  }
+  table_.fileBytes = end;
+  return assembleAs(table_);
+}
+
+std::vector<std::byte> CraftedFile::assembleAs(const SectionTable& table) const {
+  auto bytes = encodeTable(table);
+  bytes.resize(std::max<std::size_t>(bytes.size(), table_.fileBytes));
+  for (const auto& s : sections_)
+    std::copy(s.stored.begin(), s.stored.end(), bytes.begin() + std::ptrdiff_t(s.entry.offset));
+  return bytes;
 }
 
 }  // namespace esvr::test

@@ -10,18 +10,17 @@
 #include <cstring>
 #include <limits>
 
-#include "../fit/volumes.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "fit/volumes.h"
 #include "format/bytes.h"
-#include "format/crafted_file.h"
 #include "format/frame_table.h"
-#include "format/predicted_sections.h"
 #include "format/sample_files.h"
 #include "format/section_writer.h"
+#include "format/voxel_sections.h"
+#include "support/files.h"
 #include "support/messages.h"
-#include "support/temporary_folder.h"
 
 namespace esvr::test {
 namespace {
@@ -112,13 +111,6 @@ TEST(RelatedVoxels, MayReferToARelatedGrid) {
   file.grids.push_back(boundedGrid("flame", -7.0f, 1.0f));
   file.grids[2].reference = VoxelReference{1, -7.0f / 40.0f, 53.5f};
   expectComesBack(file);
-}
-
-TEST(RelatedVoxels, NeedTheVersionThatHasThem) {
-  EsvrFile file = twoAlike();
-  EXPECT_EQ(encodeEsvr(file)[kVersionMinorAt], std::byte{4});
-  file.grids[1].reference.reset();
-  EXPECT_EQ(encodeEsvr(file)[kVersionMinorAt], std::byte{0});
 }
 
 // A constant grid takes a few bytes, and a reader limits the bricks in them.

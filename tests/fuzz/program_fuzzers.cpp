@@ -9,7 +9,7 @@
 #include "esvr/camera.h"
 #include "esvr/error.h"
 #include "fuzz/fuzzer.h"
-#include "generators/skeleton.h"
+#include "generators/tubes.h"
 #include "render/camera_file.h"
 #include "render/view/requests.h"
 

@@ -21,12 +21,12 @@
 #include <utility>
 #include <vector>
 
-#include "../fit/volumes.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "metrics/dense_reference.h"
+#include "fit/volumes.h"
 #include "metrics/volumes.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -34,8 +34,6 @@ namespace {
 using test::movedBy;
 using test::randomVolume;
 using test::volumeOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 constexpr double kSumTolerance = 1e-11;
 constexpr Box kBox{{-13, -16, -3}, {9, 5, 17}};  // cuts bricks and extends beyond them
@@ -316,8 +314,7 @@ TEST(CompareVolumes, namesTheFirstVoxelThatIsNotFinite) {
   auto b = a;
   b.brickValues(0)[std::size_t(voxelOffset(localOf({-9, 2, 3})))] = NAN;
   b.brickValues(1)[0] = INFINITY;
-  EXPECT_THAT([&] { (void)compareVolumes(a, b); },
-              ThrowsMessage<BadInput>(HasSubstr("(-9, 2, 3)")));
+  EXPECT_THAT([&] { (void)compareVolumes(a, b); }, test::ThrowsSaying<BadInput>("(-9, 2, 3)"));
 }
 
 TEST(Psnr, isInfiniteWithoutError) {
@@ -335,7 +332,7 @@ TEST(Psnr, followsItsFormula) {
 constexpr int kSide = 32, kFirst = 10, kLast = 21;
 constexpr double kTolerance = 1e-10;
 
-/// The same function as in make_ssim_fixture.py.
+/// The same function as in make_metrics_fixture.py.
 double hashed(std::uint64_t index) {
   return double((index * 2654435761u % (std::uint64_t{1} << 32)) >> 8) / (1 << 24);
 }

@@ -1,4 +1,4 @@
-#include "metrics/dense_reference.h"
+#include "metrics/volumes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -18,7 +18,7 @@
 #include "esvr/error.h"
 #include "esvr/image_metrics.h"
 #include "field/random_field.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 namespace {

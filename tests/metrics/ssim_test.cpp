@@ -1,18 +1,23 @@
 // Plan: SSIM agrees with (1) plain dense float64 windows that are clipped at the box, on random
-// sparse volumes; (2) values of scikit-image (make_ssim_fixture.py); (3) closed forms for windows
-// that contain background only. The window itself is tested in tests/field/ssim_window_test.cpp.
+// sparse volumes; (2) values of scikit-image (make_metrics_fixture.py); (3) closed forms for windows
+// that contain background only. The window itself is tested in tests/field/brick_kernels_test.cpp.
 //
 // Tolerance of (1): a variance has an error of a few eps of the squared values, which are of order
 // 1, and is divided by C2 = 9e-4 peak^2. Each SSIM has an error of about 10 * 2.2e-16 / 9e-4 =
 // 2.5e-12.
+//
+// The selection by digits agrees with sorting for errors of all magnitudes, and ranks with
+// counting.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "esvr/error.h"
 #include "esvr/metrics.h"
-#include "metrics/dense_reference.h"
+#include "metrics/brick_pairs.h"
 #include "metrics/volumes.h"
 
 namespace esvr {
@@ -46,7 +51,7 @@ INSTANTIATE_TEST_SUITE_P(Random, AgainstDenseWindows,
                                          DenseCase{4, 0.0f, 0.0f, {{-14, -3, 1}, {14, 0, 2}}},
                                          DenseCase{5, 0.0f, 0.0f, {{-4, -4, -4}, {-4, -4, -4}}}));
 
-/// The block of hashed values of make_ssim_fixture.py.
+/// The block of hashed values of make_metrics_fixture.py.
 float fixtureValue(Coord v, std::uint64_t shift) {
   const auto index = std::uint64_t((v.x * 32 + v.y) * 32 + v.z) + shift;
   return float(std::uint32_t(index * 2654435761u) >> 8) * 0x1p-24f;
@@ -120,3 +125,60 @@ TEST(Ssim3d, refusesAnEmptyBoxAndAPeakThatIsNotPositive) {
 
 }  // namespace
 }  // namespace esvr
+
+// ---- Pairs of bricks
+
+namespace esvr::metrics {
+namespace {
+
+/// A row of voxels whose errors against an empty candidate are given.
+SparseVolume rowOf(const std::vector<float>& errors) {
+  std::vector<test::Voxel> voxels;
+  for (std::size_t i = 0; i < errors.size(); ++i)
+    voxels.push_back({{int(i) * 3 - 40, 1, -1}, errors[i]});
+  return test::volumeOf(voxels);
+}
+
+TEST(ErrorOfRank, isTheSortedErrorOfThatRank) {
+  std::vector<float> errors;
+  for (std::uint64_t i = 0; i < 200; ++i) {
+    const double magnitude = std::pow(10.0, 60.0 * test::hashUnit(1, i) - 30.0);
+    errors.push_back(float(i % 2 ? magnitude : -magnitude));
+  }
+  errors.insert(errors.end(), {0.0f, 0.0f, 1.0f, 1.0f, -1.0f});
+  const SparseVolume reference = rowOf(errors), none;
+  const auto pairs = pairBricks(reference, none);
+  for (float& e : errors) e = std::abs(e);
+  std::sort(errors.begin(), errors.end());
+  for (std::size_t rank = 1; rank <= errors.size(); rank += rank < 8 ? 1 : 13)
+    ASSERT_EQ(errorOfRank(pairs, rank), errors[rank - 1]) << "rank " << rank;
+}
+
+TEST(ErrorOfRank, countsEachVoxelOfTheUnionOnce) {
+  const auto a = test::volumeOf({{{0, 0, 0}, 1.0f}, {{1, 0, 0}, 2.0f}});
+  const auto b = test::volumeOf({{{1, 0, 0}, 5.0f}, {{9, 0, 0}, 7.0f}});
+  const auto pairs = pairBricks(a, b);
+  EXPECT_EQ(errorOfRank(pairs, 1), 1.0);
+  EXPECT_EQ(errorOfRank(pairs, 2), 3.0);
+  EXPECT_EQ(errorOfRank(pairs, 3), 7.0);
+}
+
+TEST(NearestRank, isTheCeilingOfTheShare) {
+  EXPECT_EQ(nearestRank(1, 999), 1u);
+  EXPECT_EQ(nearestRank(999, 999), 999u);  // the ceiling of 998.001
+  EXPECT_EQ(nearestRank(1000, 999), 999u);
+  EXPECT_EQ(nearestRank(1001, 999), 1000u);
+  EXPECT_EQ(nearestRank(2000, 999), 1998u);
+  EXPECT_EQ(nearestRank(std::uint64_t{1} << 60, 1000), std::uint64_t{1} << 60);
+}
+
+TEST(P999, isTheNineHundredNinetyNinthOfAThousandErrors) {
+  std::vector<float> errors;
+  for (int i = 0; i < 1000; ++i) errors.push_back(float((i * 7919) % 1000 + 1));  // a permutation
+  const auto m = compareVolumes(rowOf(errors), SparseVolume{});
+  EXPECT_EQ(m.p999Error, 999.0);
+  EXPECT_EQ(m.maxError, 1000.0);
+}
+
+}  // namespace
+}  // namespace esvr::metrics

@@ -12,13 +12,14 @@
 #include <limits>
 #include <vector>
 
-#include "../field/random_field.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/metrics.h"
+#include "field/random_field.h"
 #include "metrics/transmittance.h"
 #include "metrics/volumes.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -27,8 +28,6 @@ using test::movedBy;
 using test::randomVolume;
 using test::volumeOf;
 using test::Voxel;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -246,7 +245,7 @@ TEST(Transmittance, NamesAVoxelThatIsNotFinite) {
   for (const float bad : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
     const SparseVolume b = volumeOf({{{-3, 20, 9}, bad}});
     EXPECT_THAT([&] { (void)transmittancePsnr(a, b); },
-                ThrowsMessage<BadInput>(HasSubstr("(-3, 20, 9)")));
+                test::ThrowsSaying<BadInput>("(-3, 20, 9)"));
     EXPECT_THROW((void)transmittancePsnr(b, a), BadInput);
   }
 }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <vector>
 
+#include "esvr/metrics.h"
 #include "esvr/volume.h"
 
 namespace esvr::test {
@@ -35,5 +36,14 @@ SparseVolume randomVolume(const RandomVolumeOptions& options);
 
 /// The same voxels at another position. \param by  displacement, multiples of 8
 SparseVolume movedBy(SparseVolume volume, Coord by);
+
+// ---- The metrics by their definitions, as plain float64 loops, which share no code with the bricks of the library
+
+/// Computes all metrics. `everywhere` must contain all active voxels of both volumes.
+VolumeMetrics denseMetrics(const SparseVolume& reference, const SparseVolume& candidate,
+                           const Box& box, const Box& everywhere, double peak);
+
+double denseSsim(const SparseVolume& reference, const SparseVolume& candidate, const Box& box,
+                 double peak);
 
 }  // namespace esvr::test

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "cli/run_program.h"
-#include "programs/page.h"
 #include "programs/page_figures.h"
 #include "programs/pictures.h"
 

@@ -19,11 +19,10 @@
 
 #include "esvr/error.h"
 #include "programs/command_line.h"
-#include "programs/help_text.h"
-#include "programs/messages.h"
 #include "programs/option_values.h"
+#include "programs/resources.h"
 #include "programs/run_main.h"
-#include "programs/workers.h"
+#include "support/messages.h"
 
 namespace esvr::cli {
 namespace {
@@ -32,7 +31,6 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
-using testing::ThrowsMessage;
 using testing::internal::CaptureStderr;
 using testing::internal::CaptureStdout;
 using testing::internal::GetCapturedStderr;
@@ -68,7 +66,7 @@ TEST(ByteSize, knowsUnits) {
 TEST(ByteSize, refusesTextThatIsNoSize) {
   for (const char* text : {"", "KB", "-5KB", "0", "0.4", "5 KB", "5XB", "1e300", "nan", "inf"})
     EXPECT_THAT([&] { (void)parseByteSize("size", text); },
-                ThrowsMessage<UsageError>(HasSubstr("--size must be a size")))
+                test::ThrowsSaying<UsageError>("--size must be a size"))
         << text;
 }
 
@@ -87,11 +85,11 @@ TEST(DeviceMemory, isOfGigabytesWithoutAUnitIfThatIsTheOnlyMeaning) {
 TEST(DeviceMemory, refusesWhatIsNoMemoryOrTooLittle) {
   for (const char* text : {"", "x", "-4", "0", "4XB", "nan", "1e300"})
     EXPECT_THAT([&] { (void)parseDeviceMemory("max-vram", text); },
-                ThrowsMessage<UsageError>(HasSubstr("--max-vram must be a size")))
+                test::ThrowsSaying<UsageError>("--max-vram must be a size"))
         << text;
   for (const char* text : {"999KB", "0.0001"})
     EXPECT_THAT([&] { (void)parseDeviceMemory("max-vram", text); },
-                ThrowsMessage<UsageError>(HasSubstr("at least 1MB")))
+                test::ThrowsSaying<UsageError>("at least 1MB"))
         << text;
 }
 
@@ -176,7 +174,7 @@ class Refused : public testing::TestWithParam<Refusal> {};
 
 TEST_P(Refused, asAUsageErrorThatSaysWhy) {
   EXPECT_THAT([&] { (void)parse(GetParam().given); },
-              ThrowsMessage<UsageError>(HasSubstr(GetParam().text)));
+              test::ThrowsSaying<UsageError>(GetParam().text));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -224,7 +222,7 @@ TEST(CommandLine, expertHelpHasWhatTheMainHelpLeavesOut) {
   EXPECT_THAT(helpOf(line, "expert"), testing::AllOf(HasSubstr("--low"), HasSubstr("For experts."),
                                                      testing::Not(HasSubstr("--size"))));
   EXPECT_EQ(helpOf(line, "options").substr(0, 13), "--size\n--low\n");
-  EXPECT_THAT(helpOf(line, "man"), testing::AllOf(HasSubstr("low"), HasSubstr("For experts.")));
+  EXPECT_THAT(helpOf(line, "man"), test::Says("low", "For experts."));
 }
 
 TEST(CommandLine, helpHasAllWhereNothingIsForExperts) {

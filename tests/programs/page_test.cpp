@@ -16,7 +16,6 @@
 #include <limits>
 
 #include "programs/data_table.h"
-#include "programs/page.h"
 #include "programs/page_figures.h"
 
 namespace esvr::report {

@@ -19,12 +19,11 @@
 #include "esvr/error.h"
 #include "programs/pictures.h"
 #include "programs/video_file.h"
-#include "support/search_path.h"
+#include "support/files.h"
 
 namespace esvr::report {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -227,8 +226,7 @@ TEST_F(Video, asksForTheCodecOfItsName) {
             std::string(test::kOutputOfFfmpeg) + "cat > /dev/null; echo \"$@\" > \"$out\"");
   write(2, 1, "out.mp4");
   write(2, 1, "out.webm");
-  EXPECT_THAT(test::readText(folder_ / "out.mp4"),
-              AllOf(HasSubstr("libx264"), HasSubstr("-framerate 30 "), HasSubstr("2x2")));
+  EXPECT_THAT(test::readText(folder_ / "out.mp4"), test::Says("libx264", "-framerate 30 ", "2x2"));
   EXPECT_THAT(test::readText(folder_ / "out.webm"), HasSubstr("libvpx-vp9"));
 }
 

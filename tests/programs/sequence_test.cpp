@@ -14,7 +14,6 @@
 
 #include "cli/run_program.h"
 #include "esvr/error.h"
-#include "programs/frames.h"
 #include "programs/sequence.h"
 
 namespace esvr::cli {
@@ -80,7 +79,7 @@ TEST(FrameRange, IsRefusedIfItIsNone) {
     (void)frames("1-x");
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_THAT(error.what(), AllOf(HasSubstr("--frames"), HasSubstr("1-x")));
+    EXPECT_THAT(error.what(), test::Says("--frames", "1-x"));
   }
 }
 

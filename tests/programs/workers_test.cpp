@@ -17,8 +17,7 @@
 #include <vector>
 
 #include "esvr/error.h"
-#include "programs/memory.h"
-#include "programs/workers.h"
+#include "programs/resources.h"
 
 namespace esvr::cli {
 namespace {

@@ -28,7 +28,7 @@
 #include "render/ellipsoid_view.h"
 #include "render/reference_picture.h"
 #include "render/scenes.h"
-#include "support/on_threads.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 namespace {

@@ -22,23 +22,22 @@
 #include <utility>
 
 #include "esvr/error.h"
-#include "support/trials.h"
+#include "support/machine.h"
+#include "support/messages.h"
 #include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"
 
 namespace esvr {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::ThrowsMessage;
 
 class Input : public testing::Test {
  protected:
   void expectRefused(const std::filesystem::path& path, const std::string& why) const {
-    const auto says = ThrowsMessage<BadInput>(AllOf(HasSubstr(path.string()), HasSubstr(why)));
+    const auto says = test::ThrowsSaying<BadInput>(path.string(), why);
     EXPECT_THAT([&] { (void)inspectVdb(path); }, says);
     EXPECT_THAT([&] { (void)readGrid(path, "density"); }, says);
   }
@@ -49,32 +48,27 @@ class Input : public testing::Test {
   test::TemporaryFolder directory_;
 };
 
-TEST_F(Input, IsRefusedIfItIsMissing) { expectRefused(directory_ / "missing.vdb", "no such file"); }
-TEST_F(Input, IsRefusedIfItIsADirectory) { expectRefused(directory_.path(), "is a directory"); }
-TEST_F(Input, IsRefusedIfItIsADevice) { expectRefused("/dev/null", "not a regular file"); }
-TEST_F(Input, IsRefusedIfItIsEmpty) { expectRefused(fileWith(""), "is empty"); }
-TEST_F(Input, IsRefusedIfItIsOneByte) {
-  expectRefused(fileWith(" "), "neither an OpenVDB nor a NanoVDB");
-}
-TEST_F(Input, IsRefusedIfItIsText) {
-  expectRefused(fileWith("#Blender's idea of a volume\n"), "neither an OpenVDB nor a NanoVDB");
+TEST_F(Input, IsRefusedWhereItIsNoVolume) {
+  expectRefused(directory_ / "missing.vdb", "no such file");
+  expectRefused(directory_.path(), "is a directory");
+  expectRefused("/dev/null", "not a regular file");
+  expectRefused(fileWith(""), "is empty");
+  for (const char* text : {" ", "#Blender's idea of a volume\n"})
+    expectRefused(fileWith(text), "neither an OpenVDB nor a NanoVDB");
 }
 
-TEST_F(Input, IsRefusedIfItIsTooOld) {
-  test::save(directory_ / "old.vdb", {test::smallGrid()});
-  auto bytes = test::bytesOf(directory_ / "old.vdb");
-  bytes[8] = std::byte{221};  // the version follows the magic number
-  test::writeBytes(directory_ / "old.vdb", bytes);
-  expectRefused(directory_ / "old.vdb", "version 221");
-}
-
-TEST_F(Input, OfANewerFormatVersionIsTried) {
-  // OpenVDB 13 writes version 225 into every file, and nothing else changed for float grids.
-  test::save(directory_ / "new.vdb", {test::smallGrid()});
-  auto bytes = test::bytesOf(directory_ / "new.vdb");
-  bytes[8] = std::byte{225};
-  test::writeBytes(directory_ / "new.vdb", bytes);
-  EXPECT_EQ(activeVoxelCount(readGrid(directory_ / "new.vdb", "density").volume), 3u);
+// OpenVDB 13 writes version 225 into every file, and nothing else changed for float grids.
+TEST_F(Input, IsRefusedIfItIsTooOldAndTriedIfItIsNewer) {
+  test::save(directory_ / "a.vdb", {test::smallGrid()});
+  auto bytes = test::bytesIn(directory_ / "a.vdb");
+  for (const int version : {221, 225}) {
+    bytes[8] = std::byte(version);  // it follows the magic number
+    test::writeBytes(directory_ / "a.vdb", bytes);
+    if (version == 221)
+      expectRefused(directory_ / "a.vdb", "version 221");
+    else
+      EXPECT_EQ(activeVoxelCount(readGrid(directory_ / "a.vdb", "density").volume), 3u);
+  }
 }
 
 /// Grids of several types, two of which share a tree. The last one is of a type that unknownWords() changes.
@@ -109,7 +103,7 @@ openvdb::GridPtrVec gridsOfAllKinds() {
 
 /// Makes "words" a grid of strings, which OpenVDB cannot read, in a written file.
 void unknownWords(const std::filesystem::path& path) {
-  auto bytes = test::bytesOf(path);
+  auto bytes = test::bytesIn(path);
   const std::string_view known = "Tree_ptidx32_5_4_3", unknown = "Tree_strings_5_4_3";
   const auto is = [](std::byte byte, char letter) { return char(byte) == letter; };
   const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(), is);
@@ -301,7 +295,7 @@ TEST_F(Carried, GridHasTheVoxelsOfTheFile) {
 
 TEST_F(Carried, GridOfATypeThatOpenVdbDoesNotKnowComesBack) {
   test::save(in(), {test::smallGrid()});
-  auto bytes = test::bytesOf(in());
+  auto bytes = test::bytesIn(in());
   const std::string known = "Tree_float_5_4_3", odd = "Tree_quux_5_4_33";
   const auto at = std::search(bytes.begin(), bytes.end(), known.begin(), known.end(),
                               [](std::byte b, char c) { return b == std::byte(c); });
@@ -339,8 +333,7 @@ TEST_F(Carried, GridsLargerThanTheLimitAreRefusedWithTheirSize) {
       [&] {
         (void)readCarried(in(), {&place, 1}, {.maxBytes = 100'000});
       },
-      ThrowsMessage<MemoryExceeded>(
-          AllOf(HasSubstr("in.vdb"), HasSubstr("\"large\""), HasSubstr("1 MB"))));
+      test::ThrowsSaying<MemoryExceeded>("in.vdb", "\"large\"", "1 MB"));
   const VoxelMemory files({.folder = directory_ / ".", .maxHeapBytes = 1000});
   const auto inFile = readCarried(in(), {&place, 1}, {.maxBytes = 100'000, .memory = files});
   EXPECT_EQ(inFile.front().bytes.size(), inspectVdb(in()).grids.front().storedBytes);
@@ -350,31 +343,31 @@ TEST_F(Carried, GridsCannotBeWrittenToNanoVdb) {
   test::save(in(), {test::emptyGrid("Tree_vec3s_5_4_3", "v")});
   const auto grids = carryAll(in());
   EXPECT_THAT([&] { writeGrids(directory_ / "out.nvdb", {}, toWrite(grids)); },
-              ThrowsMessage<UsageError>(AllOf(HasSubstr("\"v\""), HasSubstr(".vdb"))));
+              test::ThrowsSaying<UsageError>("\"v\"", ".vdb"));
 }
 
 TEST_F(Carried, GridsOfAnotherVersionOfTheFormatAreRefused) {
   test::save(in(), {test::smallGrid(), test::emptyGrid("Tree_ptdataidx32_5_4_3", "p")});
   EXPECT_THAT(inspectVdb(in()).grids[1].whyNotCarried, IsEmpty());
-  auto bytes = test::bytesOf(in());
+  auto bytes = test::bytesIn(in());
   bytes[kVersionAt] = std::byte(223);
   test::writeBytes(in(), bytes);
   const auto grids = inspectVdb(in()).grids;
   EXPECT_THAT(grids[0].whyNotCarried, IsEmpty());
   EXPECT_THAT(grids[1].whyNotCarried, HasSubstr("223"));
-  EXPECT_THAT([&] { (void)carryAll(in()); }, ThrowsMessage<BadInput>(HasSubstr("223")));
+  EXPECT_THAT([&] { (void)carryAll(in()); }, test::ThrowsSaying<BadInput>("223"));
 
   const std::size_t place = 0;
   auto future = readCarried(in(), {&place, 1});
   future.front().vdbVersion = 1000;
   EXPECT_THAT([&] { writeGrids(out(), {}, toWrite(future)); },
-              ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr("density"), HasSubstr("1000"))));
+              test::ThrowsSaying<RuntimeFailure>("density", "1000"));
 }
 
 TEST_F(Carried, GridsOfTheFormatOfOpenVdb13AreCarriedByEarlierVersionsToo) {
   test::save(in(), {test::smallGrid(), test::emptyGrid("Tree_ptdataidx32_5_4_3", "p")});
   const auto here = carryAll(in());
-  auto bytes = test::bytesOf(in());
+  auto bytes = test::bytesIn(in());
   bytes[kVersionAt] = std::byte(225);
   test::writeBytes(in(), bytes);
   EXPECT_EQ(test::withoutVersion(carryAll(in())), test::withoutVersion(here));
@@ -415,7 +408,7 @@ class Damage : public testing::Test {
     grid->setTransform(openvdb::math::Transform::createFrustumTransform(
         {openvdb::Vec3d(0), openvdb::Vec3d(100)}, 0.5, 1.0, 0.1));
     test::saveCompressed(path(), {grid}, compression);
-    return test::bytesOf(path());
+    return test::bytesIn(path());
   }
 
   test::TemporaryFolder directory_;
@@ -469,7 +462,7 @@ TEST_F(Damage, AnyByteMayBeWrong) {
 TEST_F(Damage, AnyByteOfALeafMayBeWrong) {
   for (const auto compression : kEveryCodec) {
     test::saveCompressed(path(), {test::smallGrid()}, compression);
-    const Bytes whole = test::bytesOf(path());
+    const Bytes whole = test::bytesIn(path());
     // The last leaf's mask, packing, chunk size, chunk header and the first of its values.
     const std::size_t leafBytes = std::min<std::size_t>(whole.size(), compression ? 110 : 2200);
     for (std::size_t i = whole.size() - leafBytes; i < whole.size() - leafBytes + 110; ++i)
@@ -484,14 +477,14 @@ TEST_F(Damage, AnyByteOfALeafMayBeWrong) {
 // A leaf's mask is in the file twice, the second time before its values.
 TEST_F(Damage, ALeafWithoutTheActiveVoxelsOfItsTreeIsRefused) {
   test::saveCompressed(path(), {test::smallGrid()}, COMPRESS_NONE);
-  Bytes bytes = test::bytesOf(path());
+  Bytes bytes = test::bytesIn(path());
   constexpr std::size_t kPacking = 1;
   const std::size_t mask =
       bytes.size() - kBrickVoxels * sizeof(float) - kPacking - sizeof(BrickMask);
   std::fill_n(bytes.begin() + std::ptrdiff_t(mask), sizeof(BrickMask), std::byte{0});
   test::writeBytes(path(), bytes);
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
-              ThrowsMessage<BadInput>(HasSubstr("two different masks")));
+              test::ThrowsSaying<BadInput>("two different masks"));
 }
 
 TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
@@ -499,7 +492,7 @@ TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
   auto grid = test::smallGrid();
   grid->setGridClass(openvdb::GRID_UNKNOWN);
   test::saveCompressed(path(), {grid}, COMPRESS_ZIP | COMPRESS_ACTIVE_MASK);
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   // Three floats do not shrink, so the file ends with their negative size, -12, and the floats.
   const std::size_t at = whole.size() - 12 - 8;
   std::int64_t size = 0;
@@ -513,7 +506,7 @@ TEST_F(Damage, ANegativeChunkSizeDoesNotOverrunTheLeaf) {
 
 TEST_F(Damage, HugeCountsAndLengthsAskForNoMemory) {
   test::save(path(), {test::smallGrid()});
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   constexpr std::uint32_t kHuge = 0xfffffff0u;
   constexpr std::size_t kMetadataCount = 8 + 4 + 4 + 4 + 1 + 36;  // follows the header
   EXPECT_FALSE(readable(withValueAt(whole, kMetadataCount, kHuge)));
@@ -525,7 +518,7 @@ TEST_F(Damage, HugeCountsAndLengthsAskForNoMemory) {
 
 TEST_F(Damage, ADirectoryThatRunsInCirclesEnds) {
   test::save(path(), {test::smallGrid(), test::smallGrid()});
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   constexpr std::size_t kGridCount = 8 + 4 + 4 + 4 + 1 + 36 + 4;
   const std::size_t positions = find(whole, "Tree_float_5_4_3") + 16 + 4;
   auto circle = withValueAt(whole, kGridCount, std::int32_t{0x7fffffff});
@@ -543,7 +536,7 @@ TEST_F(Damage, AFrustumWithinAFrustumIsRefused) {
   nested.insert(nested.end(), whole.begin() + std::ptrdiff_t(outer) - 4, whole.end());
   test::writeBytes(path(), nested);
   EXPECT_THAT([&] { (void)inspectVdb(path()); },
-              ThrowsMessage<BadInput>(HasSubstr("frustum within a frustum")));
+              test::ThrowsSaying<BadInput>("frustum within a frustum"));
 }
 
 TEST_F(Damage, RealFilesCutOrAlteredDoNoHarm) {
@@ -551,7 +544,7 @@ TEST_F(Damage, RealFilesCutOrAlteredDoNoHarm) {
   std::mt19937 random(1);
   for (const char* name : {"edge/background_one.vdb", "edge/three_grids_named_density.vdb",
                            "dragon_with_xform.vdb", "aneurism.vdb", "edge/double_grid.vdb"}) {
-    const Bytes whole = test::bytesOf(test::dataDir() / name);
+    const Bytes whole = test::bytesIn(test::dataDir() / name);
     for (int i = 0; i < 20; ++i) {
       const std::size_t size = random() % whole.size();
       EXPECT_FALSE(readable(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(size)))) << size;

@@ -2,8 +2,6 @@
 
 #include <bit>
 #include <cmath>
-#include <fstream>
-#include <map>
 #include <stdexcept>
 
 #include "esvr/error.h"
@@ -41,39 +39,7 @@ openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string
   return file.readGrid(name);
 }
 
-std::vector<std::byte> bytesOf(const std::filesystem::path& path) {
-  std::vector<std::byte> bytes(std::filesystem::file_size(path));
-  std::ifstream(path, std::ios::binary)
-      .read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
-  return bytes;
-}
-
-void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes) {
-  std::filesystem::remove(path);  // ext4 flushes files that are emptied and rewritten
-  std::ofstream(path, std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
-}
-
-SparseVolume volumeOf(const std::vector<VoxelValue>& voxels, float background) {
-  std::map<Coord, BrickInput> bricks;
-  for (const auto& [voxel, value] : voxels) {
-    const Coord corner = brickOf(voxel) * kBrickSide;
-    auto [it, isNew] = bricks.try_emplace(corner);
-    if (isNew) {
-      it->second.corner = corner;
-      it->second.values.fill(background);
-    }
-    const int offset = voxelOffset(localOf(voxel));
-    it->second.values[std::size_t(offset)] = value;
-    it->second.active.set(offset);
-  }
-  std::vector<BrickInput> inputs;
-  for (auto& [corner, brick] : bricks) inputs.push_back(brick);
-  return makeVolume(std::move(inputs), background);
-}
-
-VolumeGrid gridOf(const std::string& name, const std::vector<VoxelValue>& voxels,
-                  float background) {
+VolumeGrid gridOf(const std::string& name, const std::vector<Voxel>& voxels, float background) {
   VolumeGrid grid;
   grid.descriptor.name = name;
   grid.descriptor.background = background;

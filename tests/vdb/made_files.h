@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "esvr/vdb_io.h"
-#include "support/temporary_folder.h"
+#include "metrics/volumes.h"
+#include "support/files.h"
 
 namespace esvr::test {
 
@@ -52,16 +53,8 @@ InactiveValues inactiveIn(const Grid& grid) {
   return found;
 }
 
-std::vector<std::byte> bytesOf(const std::filesystem::path& path);
-void writeBytes(const std::filesystem::path& path, const std::vector<std::byte>& bytes);
-
-/// A volume with these active voxels, in any order; the rest is background.
-struct VoxelValue {
-  Coord voxel;
-  float value;
-};
-SparseVolume volumeOf(const std::vector<VoxelValue>& voxels, float background = 0.0f);
-VolumeGrid gridOf(const std::string& name, const std::vector<VoxelValue>& voxels,
+/// A grid with these active voxels, in any order; the rest is background.
+VolumeGrid gridOf(const std::string& name, const std::vector<Voxel>& voxels,
                   float background = 0.0f);
 
 // Fail unless the bits are the same.

@@ -13,7 +13,8 @@
 #include <string_view>
 
 #include "esvr/error.h"
-#include "support/trials.h"
+#include "support/machine.h"
+#include "support/messages.h"
 #include "vdb/foreign_grids.h"
 #include "vdb/made_files.h"
 #include "vdb/write_nvdb.h"
@@ -22,9 +23,7 @@ namespace esvr {
 namespace {
 
 using test::NanoCodec;
-using testing::AllOf;
 using testing::HasSubstr;
-using testing::ThrowsMessage;
 using Bytes = std::vector<std::byte>;
 
 /// A grid with leaves, tiles of two levels, and a background that is not zero.
@@ -216,7 +215,7 @@ TEST_F(Nvdb, WithNonFiniteVoxelsIsRefusedOrMended) {
   source->tree().setValue({0, 0, 5}, std::numeric_limits<float>::quiet_NaN());
   save({source});
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
-              ThrowsMessage<BadInput>(AllOf(HasSubstr("1 voxel is"), HasSubstr("(0, 0, 5)"))));
+              test::ThrowsSaying<BadInput>("1 voxel is", "(0, 0, 5)"));
   EXPECT_EQ(readGrid(path(), "density", {.nonFinite = NonFinite::kValue}).nonFiniteReplaced, 1u);
 }
 
@@ -225,7 +224,7 @@ TEST_F(Nvdb, WithAHugeTileIsRefusedBeforeItIsExpanded) {
   source->tree().addTile(3, {4096, 0, 0}, 1.0f, true);
   save({source});
   EXPECT_THAT([&] { (void)readGrid(path(), "density"); },
-              ThrowsMessage<MemoryExceeded>(HasSubstr("bricks")));
+              test::ThrowsSaying<MemoryExceeded>("bricks"));
 }
 
 TEST_F(Nvdb, WrittenIsWhatNanoVdbReads) {
@@ -255,7 +254,7 @@ TEST_F(Nvdb, CannotHoldHalf) {
 TEST_F(Nvdb, CutAnywhereIsRefused) {
   for (const NanoCodec codec : {NanoCodec::kNone, NanoCodec::kZip, NanoCodec::kBlosc}) {
     save({sourceGrid()}, codec);
-    const Bytes whole = test::bytesOf(path());
+    const Bytes whole = test::bytesIn(path());
     ASSERT_TRUE(readable(whole));
     for (std::size_t size = 0; size < whole.size(); size += 1 + whole.size() / 100)
       EXPECT_FALSE(readable(Bytes(whole.begin(), whole.begin() + std::ptrdiff_t(size)))) << size;
@@ -265,7 +264,7 @@ TEST_F(Nvdb, CutAnywhereIsRefused) {
 TEST_F(Nvdb, AnyByteMayBeWrong) {
   for (const NanoCodec codec : {NanoCodec::kNone, NanoCodec::kZip, NanoCodec::kBlosc}) {
     save({test::smallGrid()}, codec);
-    const Bytes whole = test::bytesOf(path());
+    const Bytes whole = test::bytesIn(path());
     // Many bytes of the headers are damaged, and some bytes of the nodes, which are large and mostly
     // empty.
     for (std::size_t i = 0; i < whole.size();
@@ -279,7 +278,7 @@ TEST_F(Nvdb, AnyByteMayBeWrong) {
 
 TEST_F(Nvdb, OffsetsThatLeadAstrayAreNotFollowed) {
   save({test::smallGrid()});
-  const Bytes whole = test::bytesOf(path());
+  const Bytes whole = test::bytesIn(path());
   // The offsets of tree and nodes are 64-bit words whose change moves a node. Whichever words they
   // are, none may lead outside the file.
   const std::int64_t astray[] = {std::int64_t{1} << 40, -(std::int64_t{1} << 40),
@@ -302,20 +301,19 @@ TEST_F(Nvdb, OffsetsThatLeadAstrayAreNotFollowed) {
 
 TEST_F(Nvdb, OfAnotherMajorVersionIsRefused) {
   save({test::smallGrid()});
-  Bytes bytes = test::bytesOf(path());
+  Bytes bytes = test::bytesIn(path());
   for (const auto& [version, text] :
        {std::pair(31u << 21 | 5u << 10 | 7u, "31.5.7"), std::pair(28u, "0.0.28")}) {
     std::memcpy(bytes.data() + 8, &version, sizeof version);
     test::writeBytes(path(), bytes);
-    EXPECT_THAT(
-        [&] { (void)inspectVdb(path()); },
-        ThrowsMessage<BadInput>(HasSubstr(std::string("written by NanoVDB ") + text + ",")));
+    EXPECT_THAT([&] { (void)inspectVdb(path()); },
+                test::ThrowsSaying<BadInput>(std::string("written by NanoVDB ") + text + ","));
   }
 }
 
 TEST_F(Nvdb, WithTheMagicNumberOfNewerFilesIsRead) {
   save({test::smallGrid()});
-  Bytes bytes = test::bytesOf(path());
+  Bytes bytes = test::bytesIn(path());
   bytes[7] = std::byte{'2'};
   test::writeBytes(path(), bytes);
   EXPECT_EQ(activeVoxelCount(readGrid(path(), "density").volume), 3u);
@@ -339,7 +337,7 @@ TEST_F(Nvdb, OfBuffersWithoutADirectoryReadsAsItsSource) {
   save(sources);
   const auto listed = inspectVdb(path()).grids;
   test::saveNanoBuffers(path(), sources);
-  const Bytes old = test::bytesOf(path());
+  const Bytes old = test::bytesIn(path());
   for (const Bytes& bytes : {old, asNewBuffers(old)}) {
     test::writeBytes(path(), bytes);
     const auto found = inspectVdb(path()).grids;
@@ -359,7 +357,7 @@ TEST_F(Nvdb, OfBuffersWithoutADirectoryReadsAsItsSource) {
 
 TEST_F(Nvdb, OfBuffersThatAreCutOrDamagedIsRefusedOrRead) {
   test::saveNanoBuffers(path(), {test::smallGrid(), test::smallGrid()});
-  const Bytes both = asNewBuffers(test::bytesOf(path()));
+  const Bytes both = asNewBuffers(test::bytesIn(path()));
   const auto begin = [&](std::size_t size) {
     return Bytes(both.begin(), both.begin() + std::ptrdiff_t(size));
   };

@@ -15,19 +15,17 @@
 #include <limits>
 
 #include "esvr/error.h"
-#include "support/file_size_limit.h"
+#include "support/files.h"
+#include "support/messages.h"
 #include "vdb/made_files.h"
 
 namespace esvr {
 namespace {
 
 using openvdb::FloatGrid;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
-std::vector<test::VoxelValue> fullBrick(Coord corner, float value) {
-  std::vector<test::VoxelValue> voxels;
+std::vector<test::Voxel> fullBrick(Coord corner, float value) {
+  std::vector<test::Voxel> voxels;
   for (int i = 0; i < kBrickVoxels; ++i) voxels.push_back({corner + voxelLocal(i), value});
   return voxels;
 }
@@ -35,11 +33,16 @@ std::vector<test::VoxelValue> fullBrick(Coord corner, float value) {
 class Write : public testing::Test {
  protected:
   [[nodiscard]] std::filesystem::path path() const { return directory_ / "out.vdb"; }
+  void write(const VolumeGrid& grid, const WriteOptions& options = {},
+             const std::string& name = "out.vdb") const {
+    writeGrids(directory_ / name, {}, {&grid, 1}, options);
+  }
   FloatGrid::Ptr writeAndLoad(const VolumeGrid& grid, const WriteOptions& options = {}) {
-    writeGrids(path(), {}, {&grid, 1}, options);
+    write(grid, options);
     return openvdb::gridPtrCast<FloatGrid>(test::load(path(), grid.descriptor.name));
   }
   test::TemporaryFolder directory_;
+  const VolumeGrid grid_ = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
 };
 
 TEST_F(Write, InactiveVoxelsHoldTheBackground) {
@@ -83,7 +86,7 @@ TEST_F(Write, LeavesRemainWhereAllVoxelsWouldBeInTiles) {
 }
 
 TEST_F(Write, AMergedTileOfManyBricksKeepsALeafToo) {
-  std::vector<test::VoxelValue> voxels;
+  std::vector<test::Voxel> voxels;
   for (int brick = 0; brick < 4096; ++brick) {
     const Coord corner = Coord{brick / 256, brick / 16 % 16, brick % 16} * kBrickSide;
     const auto more = fullBrick(corner, 0.5f);
@@ -103,7 +106,7 @@ TEST_F(Write, DoublesThatWereSavedAsHalfAreRoundedOnlyIfNothingIsLost) {
     test::save(path(), {source});
     VolumeGrid grid = readGrid(path(), "density");
     grid.volume.brickValues(0)[voxelOffset({1, 2, 3})] = value;
-    writeGrids(path(), {}, {&grid, 1}, {.overwrite = true});
+    write(grid, {.overwrite = true});
     EXPECT_EQ(inspectVdb(path()).grids.front().savedAsHalf, value == 0.25f);
     EXPECT_EQ(valueAt(readGrid(path(), "density").volume, {1, 2, 3}), value);
   }
@@ -153,7 +156,7 @@ TEST_F(Write, ADoubleSourceComesBackDouble) {
   grid.descriptor.valueType = ValueType::kDouble;
   grid.descriptor.background = 0.1;
   grid.volume.background = 0.1f;
-  writeGrids(path(), {}, {&grid, 1});
+  write(grid);
   const auto back = openvdb::gridPtrCast<openvdb::DoubleGrid>(test::load(path(), "density"));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->background(), 0.1);
@@ -178,13 +181,10 @@ TEST_F(Write, HalfFollowsTheSourceUnlessToldOtherwise) {
 
 TEST_F(Write, ValuesBeyondHalfAreRefusedNotMadeInfinite) {
   auto grid = test::gridOf("density", {{{0, 0, 0}, 65504.0f}});
-  EXPECT_NO_THROW(writeGrids(path(), {}, {&grid, 1}, {.half = HalfMode::kOn}));
+  EXPECT_NO_THROW(write(grid, {.half = HalfMode::kOn}));
   grid = test::gridOf("heat", {{{0, 0, 0}, -70000.0f}});
-  EXPECT_THAT(
-      [&] {
-        writeGrids(path(), {}, {&grid, 1}, {.half = HalfMode::kOn, .overwrite = true});
-      },
-      ThrowsMessage<UsageError>(AllOf(HasSubstr("heat"), HasSubstr("65504"))));
+  EXPECT_THAT([&] { write(grid, {.half = HalfMode::kOn, .overwrite = true}); },
+              test::ThrowsSaying<UsageError>("heat", "65504"));
   EXPECT_EQ(inspectVdb(path()).grids.front().name, "density");  // the old file stands
   EXPECT_EQ(directory_.names().size(), 1u);
 }
@@ -199,7 +199,7 @@ TEST_F(Write, SeveralGridsOfOneNameKeepTheirOrder) {
 }
 
 TEST_F(Write, IsPackedByBloscAndActiveMask) {
-  const auto back = writeAndLoad(test::gridOf("density", {{{0, 0, 0}, 1.0f}}));
+  const auto back = writeAndLoad(grid_);
   const auto packing =
       back->getMetadata<openvdb::StringMetadata>(openvdb::GridBase::META_FILE_COMPRESSION);
   ASSERT_TRUE(packing);
@@ -207,8 +207,8 @@ TEST_F(Write, IsPackedByBloscAndActiveMask) {
 }
 
 /// Voxels in many leaves whose compressed bytes differ.
-std::vector<test::VoxelValue> leavesOfManySizes() {
-  std::vector<test::VoxelValue> voxels;
+std::vector<test::Voxel> leavesOfManySizes() {
+  std::vector<test::Voxel> voxels;
   for (int leaf = 0; leaf < 64; ++leaf)
     for (int i = 0; i <= 8 * leaf; ++i)
       voxels.push_back({Coord{8 * leaf, 0, 0} + voxelLocal(i), std::sin(float(i * leaf))});
@@ -242,40 +242,30 @@ TEST_F(Write, StatisticsAreThoseOfTheGridThatIsReadAgain) {
 TEST_F(Write, AnExistingFileStaysUnlessOverwriteIsGiven) {
   const auto old = test::gridOf("old", {{{0, 0, 0}, 1.0f}});
   const auto fresh = test::gridOf("new", {{{0, 0, 0}, 1.0f}});
-  writeGrids(path(), {}, {&old, 1});
-  EXPECT_THAT(
-      [&] {
-        writeGrids(path(), {}, {&fresh, 1});
-      },
-      ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr("out.vdb"), HasSubstr("exists"))));
+  write(old);
+  EXPECT_THAT([&] { write(fresh); }, test::ThrowsSaying<RuntimeFailure>("out.vdb", "exists"));
   EXPECT_EQ(inspectVdb(path()).grids.front().name, "old");
-  writeGrids(path(), {}, {&fresh, 1}, {.overwrite = true});
+  write(fresh, {.overwrite = true});
   EXPECT_EQ(inspectVdb(path()).grids.front().name, "new");
   EXPECT_EQ(directory_.names().size(), 1u);
 }
 
 TEST_F(Write, OtherExtensionsAreRefused) {
-  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
   for (const char* name : {"out.esvr", "out", "out.VDB.gz"})
-    EXPECT_THROW(writeGrids(directory_ / name, {}, {&grid, 1}), UsageError) << name;
+    EXPECT_THROW(write(grid_, {}, name), UsageError) << name;
   EXPECT_EQ(directory_.names().size(), 0u);
 }
 
 TEST_F(Write, ADirectoryThatIsNotThereIsNamed) {
-  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
-  EXPECT_THAT(
-      [&] {
-        writeGrids(directory_ / "nowhere/out.vdb", {}, {&grid, 1});
-      },
-      ThrowsMessage<RuntimeFailure>(HasSubstr("nowhere/out.vdb")));
+  EXPECT_THAT([&] { write(grid_, {}, "nowhere/out.vdb"); },
+              test::ThrowsSaying<RuntimeFailure>("nowhere/out.vdb"));
 }
 
 TEST_F(Write, ADirectoryWithoutPermissionIsAnError) {
   if (::geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
-  const auto grid = test::gridOf("density", {{{0, 0, 0}, 1.0f}});
   std::filesystem::permissions(
       directory_.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
-  EXPECT_THROW(writeGrids(path(), {}, {&grid, 1}), RuntimeFailure);
+  EXPECT_THROW(write(grid_), RuntimeFailure);
   std::filesystem::permissions(directory_.path(), std::filesystem::perms::owner_all);
 }
 
@@ -284,11 +274,8 @@ TEST_F(Write, AFullDiskIsNoticedAndLeavesNothing) {
   for (const char* name : {"out.vdb", "out.nvdb"}) {
     for (const rlim_t limit : {rlim_t{0}, rlim_t{100}, rlim_t{600}}) {
       const test::FileSizeLimit full(limit);
-      EXPECT_THAT(
-          [&] {
-            writeGrids(directory_ / name, {}, {&grid, 1});
-          },
-          ThrowsMessage<RuntimeFailure>(AllOf(HasSubstr(name), HasSubstr("disk is full"))))
+      EXPECT_THAT([&] { write(grid, {}, name); },
+                  test::ThrowsSaying<RuntimeFailure>(name, "disk is full"))
           << limit;
     }
     EXPECT_EQ(directory_.names().size(), 0u);
@@ -417,7 +404,7 @@ TEST_F(OtherPackedFile, OfVectorsHasTheirComponents) {
   writeGrids(path("out.vdb"), {}, grids);
   EXPECT_EQ(valueAt(readVector(path("out.vdb"), "wind").components[1], {1, 2, 3}), -2.0f);
   EXPECT_THAT([&] { writeGrids(path("out.nvdb"), {}, grids); },
-              ThrowsMessage<UsageError>(HasSubstr("vec3s")));
+              test::ThrowsSaying<UsageError>("vec3s"));
 }
 
 TEST_F(OtherPackedFile, OfFloatsHasTheVoxelsThatReadGridHasAndIsWrittenAsNanoVdb) {
@@ -467,7 +454,7 @@ TEST_F(OtherPackedFile, OfOtherTypesIsRefused) {
   places->tree().setValue({0, 0, 0}, {1, 2, 3});
   test::save(path("in.vdb"), {places});
   EXPECT_THAT([&] { (void)readPacked(path("in.vdb"), "places"); },
-              ThrowsMessage<BadInput>(HasSubstr("places")));
+              test::ThrowsSaying<BadInput>("places"));
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ bl_info = {
 
 def _parts():
     """The modules that register something, in order. Tests of the other modules import this package without bpy."""
-    from . import import_export, modal, panel, preferences, properties, watch
-    return preferences, properties, import_export, panel, watch, modal
+    from . import import_export, modal, preferences, volumes, watch
+    return preferences, volumes, import_export, watch, modal
 
 
 def register():

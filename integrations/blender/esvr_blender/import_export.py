@@ -13,7 +13,6 @@ from .export import Export, Goal, Input, export
 from .jobs import Job, JobFailed
 from .modal import JobOperator
 from .preferences import absolute
-from .properties import remember
 from .source import EXTENSION, Source, SourceError, grouped, text_of_gaps
 
 
@@ -114,7 +113,7 @@ def add_volume(context, request, entry):
                                  use_sequence_detection=bool(entry.frames))
     added = context.view_layer.objects.active
     added.name = added.data.name = request.source.stem
-    remember(added.data.esvr, volumes.relative_if_wanted(request.source.text), request.settings)
+    volumes.remember(added.data.esvr, volumes.relative_if_wanted(request.source.text), request.settings)
     volumes.show(added.data, entry)
 
 

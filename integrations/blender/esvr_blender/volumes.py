@@ -1,13 +1,60 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Volumes of Blender that show decoded files of the cache."""
+"""Volumes of Blender that show decoded files of the cache: what they remember of their .esvr file, and their panel ESVR."""
 import os
+import time
 
 import bpy
+from bpy.props import BoolProperty, IntProperty, IntVectorProperty, PointerProperty, StringProperty
 
-from . import cache, preferences
+from . import cache, preferences, watch
+from .cache import Settings
 from .decode import Request
-from .properties import settings_of
 from .source import Source, SourceError
+
+LARGEST = 2**31 - 1
+
+
+def changed(self, context):
+    watch.schedule(self.id_data.name)
+
+
+class ESVRVolumeProperties(bpy.types.PropertyGroup):
+    source: StringProperty(
+        name="Source", subtype="FILE_PATH", update=changed,
+        description="The .esvr file; a pattern such as smoke.####.esvr stands for the numbered files of a sequence")
+    layers: IntProperty(
+        name="Level of Detail", min=0, update=changed,
+        description="Decode only this many importance layers of each grid, from the first; 0 decodes all")
+    max_ellipsoids: IntProperty(
+        name="Max Ellipsoids", min=0, update=changed,
+        description="Decode only this many ellipsoids of each grid, those of the largest weight; 0 decodes all")
+    use_box: BoolProperty(name="Only a Box", update=changed, description="Decode only the voxels of a box")
+    box_min: IntVectorProperty(name="From", size=3, update=changed, description="The first voxel along each axis")
+    box_max: IntVectorProperty(name="To", size=3, update=changed, default=(63, 63, 63),
+                               description="The last voxel along each axis")
+    use_frames: BoolProperty(name="Only Some Frames", update=changed,
+                             description="Decode only a range of the frames of a sequence")
+    frame_first: IntProperty(name="First", min=0, max=LARGEST, update=changed, description="The first frame")
+    frame_last: IntProperty(name="Last", min=0, max=LARGEST, update=changed, description="The last frame")
+
+
+def settings_of(properties):
+    box = (*properties.box_min, *properties.box_max) if properties.use_box else None
+    frames = (properties.frame_first, properties.frame_last) if properties.use_frames else None
+    return Settings(properties.layers or None, properties.max_ellipsoids or None, box, frames)
+
+
+def remember(properties, source, settings):
+    """Stores a source, as the text that is shown, and the settings that it was decoded with."""
+    properties.source = source
+    properties.layers = settings.layers or 0
+    properties.max_ellipsoids = settings.max_ellipsoids or 0
+    properties.use_box = settings.box is not None
+    if settings.box:
+        properties.box_min, properties.box_max = settings.box[:3], settings.box[3:]
+    properties.use_frames = settings.frames is not None
+    if settings.frames:
+        properties.frame_first, properties.frame_last = settings.frames
 
 
 def is_ours(volume):
@@ -65,3 +112,58 @@ def show(volume, entry):
     if frames:  # the frame frame_start of the scene shows the first file
         volume.frame_duration = frames[-1] - frames[0] + 1
         volume.frame_offset = frames[0] - 1
+
+
+STATE_SECONDS = 2.0  # for which a state is shown before the files are looked at again; panels are drawn very often
+
+states = {}  # the time and the state by what is shown
+
+
+def shown_state_of(volume):
+    key = (volume.name, volume.filepath, volume.esvr.source, settings_of(volume.esvr))
+    now = time.monotonic()
+    if key not in states or now - states[key][0] > STATE_SECONDS:
+        states.clear()
+        states[key] = (now, state_of(volume))
+    return states[key][1]
+
+
+class DATA_PT_esvr(bpy.types.Panel):
+    bl_label = "ESVR"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        volume = getattr(context, "volume", None)
+        return volume is not None and bool(volume.esvr.source)
+
+    def draw(self, context):
+        layout, properties = self.layout, context.volume.esvr
+        layout.use_property_split = True
+        layout.prop(properties, "source")
+        layout.prop(properties, "layers")
+        layout.prop(properties, "max_ellipsoids")
+        layout.prop(properties, "use_box")
+        if properties.use_box:
+            layout.prop(properties, "box_min")
+            layout.prop(properties, "box_max")
+        layout.prop(properties, "use_frames")
+        if properties.use_frames:
+            layout.prop(properties, "frame_first")
+            layout.prop(properties, "frame_last")
+        layout.label(text=shown_state_of(context.volume))
+        layout.operator("esvr.reload", icon="FILE_REFRESH").names = context.volume.name
+
+
+def register():
+    bpy.utils.register_class(ESVRVolumeProperties)
+    bpy.types.Volume.esvr = PointerProperty(type=ESVRVolumeProperties)
+    bpy.utils.register_class(DATA_PT_esvr)
+
+
+def unregister():
+    bpy.utils.unregister_class(DATA_PT_esvr)
+    del bpy.types.Volume.esvr
+    bpy.utils.unregister_class(ESVRVolumeProperties)

@@ -1,4 +1,4 @@
-#include "fit/chunks/divide.h"
+#include "fit/chunks/chunks.h"
 
 #include <algorithm>
 #include <cmath>

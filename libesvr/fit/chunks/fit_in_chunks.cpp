@@ -1,4 +1,4 @@
-#include "fit/chunks/fit_in_chunks.h"
+#include "fit/chunks/chunks.h"
 
 #include <algorithm>
 #include <cmath>

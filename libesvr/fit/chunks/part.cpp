@@ -1,4 +1,4 @@
-#include "fit/chunks/part.h"
+#include "fit/chunks/chunks.h"
 
 #include <xxhash.h>
 

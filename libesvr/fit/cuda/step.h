@@ -10,7 +10,6 @@
 #include "core/cuda/device_buffer.h"
 #include "fit/adam.h"
 #include "fit/cuda/brick_pass.h"
-#include "fit/gradient.h"
 #include "fit/motion_bound.h"
 #include "fit/optimiser.h"
 

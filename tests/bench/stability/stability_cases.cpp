@@ -1,4 +1,4 @@
-#include "stability.h"
+#include "bench/stability/stability.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,8 +10,7 @@ import shutil
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-TESTS = {"modules": ["test_source.py", "test_cache.py", "test_jobs.py", "test_decode.py", "test_export.py",
-                     "test_manifest.py"],
+TESTS = {"modules": ["test_modules.py", "test_decode.py", "test_export.py"],
          "blender": ["test_addon.py"]}
 
 

@@ -2,7 +2,7 @@
 /// Tests that call functions of CUDA themselves.
 
 #include "core/cuda/runtime.h"
-#include "support/on_device.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 

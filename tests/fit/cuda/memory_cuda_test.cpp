@@ -11,13 +11,13 @@
 #include <cstdint>
 #include <future>
 
-#include "../random_ellipsoids.h"
-#include "../volumes.h"
 #include "core/cuda/device_buffer.h"
 #include "esvr/encode.h"
 #include "fit/cuda/cuda_optimiser.h"
+#include "fit/cuda/gpu_test.h"
 #include "fit/cuda/memory_plan.h"
-#include "gpu_test.h"
+#include "fit/gradient_scene.h"
+#include "fit/volumes.h"
 
 namespace esvr {
 namespace {

@@ -8,12 +8,12 @@
 #include <cmath>
 #include <limits>
 
-#include "../paper/paper_loss_scene.h"
-#include "../random_ellipsoids.h"
 #include "core/cuda/device_buffer.h"
 #include "core/cuda/runtime.h"
+#include "fit/cuda/gpu_test.h"
+#include "fit/gradient_scene.h"
+#include "fit/paper/paper_loss_scene.h"
 #include "fit/paper/paper_optimiser.h"
-#include "gpu_test.h"
 
 namespace esvr {
 namespace {

@@ -15,7 +15,7 @@
 #include "field/random_field.h"
 #include "render/reference_picture.h"
 #include "render/scenes.h"
-#include "support/on_device.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 namespace {

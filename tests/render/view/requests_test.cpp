@@ -8,16 +8,15 @@
 #include <set>
 
 #include "esvr/error.h"
-#include "render/view/command_text.h"
-#include "render/view/request_rules.h"
+#include "render/view/desk.h"
 #include "render/view/requests.h"
+#include "render/view/server.h"
+#include "support/messages.h"
 
 namespace esvr::view {
 namespace {
 
 using nlohmann::json;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 // Scenes.
 
@@ -49,7 +48,7 @@ TEST(TransferJson, IsRefusedByItsMember) {
     content[member] = value;
     return [content] { (void)transferOf(content); };
   };
-  const auto says = [](const char* text) { return ThrowsMessage<Error>(HasSubstr(text)); };
+  const auto says = [](const char* text) { return test::ThrowsSaying<Error>(text); };
   EXPECT_THAT(refused("space", "CMYK"), says("\"transfer.space\""));
   EXPECT_THAT(refused("colors", json::array()), says("\"transfer.colors\""));
   EXPECT_THAT(refused("colors", {{1, 2, 3}}), says("\"transfer.colors\" must be a list of 4"));
@@ -134,7 +133,7 @@ TEST(SceneJson, IsRefusedByItsMember) {
            {R"({"compare": {"split": 2}})", "\"scene.compare.split\""},
            {R"({"compare": {"path": "x"}})", "\"scene.compare.path\" is not known"}})
     EXPECT_THAT([text = text] { (void)sceneOf(json::parse(text)); },
-                ThrowsMessage<Error>(HasSubstr(why)));
+                test::ThrowsSaying<Error>(why));
 }
 
 TEST(CameraJson, ComesBackAsTheSameCamera) {

@@ -2,19 +2,20 @@
 // that know the token then do what no page does: they break the protocol, send nonsense and numbers
 // without bounds, stop in the middle, and do not read. Each of them loses its connection or gets an
 // error, and another client is served as before.
-
-#include "render/view/server.h"
+//
+// A file is put into a small page and into the bundle, and taken out again by hand.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <set>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "field/random_field.h"
-#include "render/view/page.h"
+#include "render/view/server.h"
 #include "render/view/view_client.h"
 #include "support/messages.h"
 
@@ -32,7 +33,6 @@ using test::SocketClosed;
 using test::statusOf;
 using test::ViewAnswer;
 using test::ViewClient;
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
@@ -107,12 +107,11 @@ class ServerTest : public testing::Test {
 TEST_F(ServerTest, GivesThePageToThoseWhoKnowTheToken) {
   const std::string answer = answerTo(at_, getRequest(at_, page()));
   ASSERT_EQ(statusOf(answer), 200);
-  EXPECT_THAT(answer, AllOf(HasSubstr("Content-Type: text/html; charset=utf-8\r\n"),
-                            HasSubstr("X-Content-Type-Options: nosniff\r\n"),
-                            HasSubstr("Referrer-Policy: no-referrer\r\n"),
-                            HasSubstr("Cache-Control: no-store\r\n"),
-                            HasSubstr("Cross-Origin-Resource-Policy: same-origin\r\n"),
-                            HasSubstr("Content-Security-Policy: default-src 'none'; ")));
+  EXPECT_THAT(answer, test::Says("Content-Type: text/html; charset=utf-8\r\n",
+                                 "X-Content-Type-Options: nosniff\r\n",
+                                 "Referrer-Policy: no-referrer\r\n", "Cache-Control: no-store\r\n",
+                                 "Cross-Origin-Resource-Policy: same-origin\r\n",
+                                 "Content-Security-Policy: default-src 'none'; "));
   EXPECT_THAT(answer, HasSubstr(std::string(viewPage().substr(viewPage().rfind('<')))));
 }
 
@@ -662,5 +661,36 @@ TEST_F(HostileClient, TooManyTasksOfOneClientAreRefused) {
   EXPECT_GT(refused, 0);
 }
 
+// ---- The page
+
+constexpr const char* kPage =
+    "<p>before</p>\n<script id=\"esvr-file\" type=\"application/octet-stream;base64\" "
+    "data-name=\"\"></script>\n<p>after</p>";
+
+TEST(ExportedPage, HasTheFileAndItsNameInTheirPlaces) {
+  EXPECT_EQ(exportedPage(kPage, "a.esvr", std::string("\0\1\2\3", 4)),
+            "<p>before</p>\n<script id=\"esvr-file\" type=\"application/octet-stream;base64\" "
+            "data-name=\"a.esvr\">AAECAw==</script>\n<p>after</p>");
+}
+
+TEST(ExportedPage, HasNamesThatAreNoMarkup) {
+  EXPECT_THAT(exportedPage(kPage, "\"></script><b>&.esvr", "x"),
+              HasSubstr("data-name=\"&quot;&gt;&lt;/script&gt;&lt;b&gt;&amp;.esvr\">eA==<"));
+}
+
+TEST(ExportedPage, OfTheBundleHasEverythingElseUnchanged) {
+  const std::string_view bundle = exportPageBundle();
+  const std::string page = exportedPage(bundle, "a", "xyz");
+  EXPECT_EQ(page.size(), bundle.size() + 1 + 4);
+  const std::size_t place = page.find("eHl6</script>");
+  ASSERT_NE(place, std::string::npos);
+  EXPECT_EQ(page.substr(place + 4), bundle.substr(place - 1));
+}
+
+TEST(ExportedPage, NeedsAPlace) {
+  EXPECT_THROW((void)exportedPage("<p></p>", "a", "x"), std::logic_error);
+}
+
 }  // namespace
+
 }  // namespace esvr::view

@@ -1,4 +1,4 @@
-// Wrote the files of this folder, which other_versions_test.cpp reads, with OpenVDB 13.0.0 and its NanoVDB 32.9.0 (both
+// Wrote the files of this folder, which foreign_files_test.cpp reads, with OpenVDB 13.0.0 and its NanoVDB 32.9.0 (both
 // of the tag v13.0.0). It is no part of the build, since the distributions have older versions. To run it, configure
 // OpenVDB with -D USE_BLOSC=ON -D OPENVDB_CORE_STATIC=ON, install it to PREFIX, and
 //

@@ -1,5 +1,5 @@
 /**
- * The command line that makes the same picture, as render/view/command_text.cpp writes it.
+ * The command line that makes the same picture, as render/view/desk.cpp writes it.
  * @typedef {import("../types.js").Scene} Scene
  * @typedef {import("../types.js").Description} Description
  */
