@@ -6,7 +6,6 @@
 #include <unordered_map>
 
 #include "esvr/error.h"
-#include "programs/names.h"
 #include "programs/option_values.h"
 #include "programs/run_main.h"
 #include "programs/sequence.h"
