@@ -2,8 +2,8 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <map>
-#include <sstream>
 
 #include "esvr/did_you_mean.h"
 #include "esvr/error.h"
@@ -381,9 +381,9 @@ std::uint64_t hashOf(double value) {
 }
 
 std::string shortText(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
+  char text[32];  // a stream would bring the locales of the C++ library into the decoder of the page
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
 }
 
 }  // namespace
