@@ -12,6 +12,9 @@
 
 namespace esvr::format {
 
+/// Bits that the place of a brick may have along an axis, from the first brick on.
+inline constexpr int kMaxBrickBits = 21;
+
 [[nodiscard]] std::vector<std::byte> putVoxels(const VoxelLayer& layer);
 
 /// True if the section takes more than a number of bytes. Coding stops where that is known.
