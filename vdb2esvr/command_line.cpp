@@ -198,8 +198,8 @@ void addFileOptions(cli::po::options_description& options) {
      "leave this grid out; may be repeated")
     ("share", value<std::string>()->value_name("W")->default_value("auto"),
      "auto: grids of one transform refer to each other where that makes the file smaller, and small "
-     "parts of the file are stored together; off: each grid is stored on its own, as with --size and "
-     "--ratio")
+     "parts of the file are stored together; off: each grid is stored on its own. With --size "
+     "and --ratio, no grid refers to another one")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; keep: store where they are, so that they come back; zero, "
      "background or a number: replace them by 0, by the background of the grid or by that number")

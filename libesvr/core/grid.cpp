@@ -381,7 +381,8 @@ std::uint64_t hashOf(double value) {
 }
 
 std::string shortText(double value) {
-  char text[32];  // a stream would bring the locales of the C++ library into the decoder of the page
+  char
+      text[32];  // a stream would bring the locales of the C++ library into the decoder of the page
   std::snprintf(text, sizeof text, "%g", value);
   return text;
 }

@@ -321,11 +321,16 @@ using LeastBytes = std::map<std::size_t, std::uint64_t>;
 /// Divides the wanted size of a file among its grids. Every grid gets a few bytes, or those that it was found to
 /// need, and grids share the others by their active voxels. Bytes that a grid does not use go to those that
 /// are converted after it. Twins of a grid have no share; the bytes of their records are reserved.
+///
+/// A grid is converted to bytes that it takes on its own. In a compact file it takes a few hundred fewer, which are
+/// known of the grids that are made, and which the next ones get in addition.
 class ByteShares {
  public:
+  /// \param isCompact  the file will have FileLayout::kCompact
   ByteShares(const FileSource& source, std::optional<std::uint64_t> size, const Twins& twins,
-             const LeastBytes& needed)
-      : left_(size), shares_(source.grids.size()) {
+             const LeastBytes& needed, bool isCompact)
+      : left_(size), shares_(source.grids.size()), isCompact_(isCompact) {
+    records_.layout = FileLayout::kCompact;
     // A file without grids has nothing to divide, and no option makes it smaller.
     if (source.grids.empty() && source.carried.empty()) left_.reset();
     if (!left_) return;
@@ -351,6 +356,9 @@ class ByteShares {
     return share.least + std::uint64_t(divided * share.weight / weightLeft_);
   }
 
+  /// Bytes that a grid saves in a compact file, as far as is known: the fewest of those that were made.
+  [[nodiscard]] std::uint64_t saved() const { return saved_.value_or(0); }
+
   /// Subtracts the bytes of a converted grid and of its twins.
   /// \param previous  the same grid of the previous frame, from which it is predicted; null: none
   /// \return the bytes by which they exceed their share; if there are any, nothing is subtracted
@@ -358,9 +366,15 @@ class ByteShares {
                                    const StoredGrid* previous) {
     if (!left_) return 0;
     const Share& share = shares_[grid];
-    const std::uint64_t bytes = bytesOf(share, stored, previous),
-                        allowed = *of(grid) + share.reserved;
+    const std::uint64_t allowed = *of(grid) + share.reserved;
+    const std::uint64_t bytes =
+        isCompact_ ? bytesInCompact(share, stored) : bytesOf(share, stored, previous);
     if (bytes > allowed) return bytes - allowed;
+    if (isCompact_) {
+      records_.grids.push_back(encode::recordAlone(stored));
+      const std::uint64_t saved = less(bytesAdded(stored), bytes);
+      if (share.twins.empty()) saved_ = std::min(saved_.value_or(saved), saved);
+    }
     left_ = less(*left_ + share.reserved, bytes);
     weightLeft_ -= share.weight;
     leastLeft_ -= share.least;
@@ -378,7 +392,8 @@ class ByteShares {
 
   void reserve(const Twin& twin) {
     Share& share = shares_[twin.of];
-    const std::uint64_t bytes = usualBytes(twin.descriptor);
+    constexpr std::uint64_t kSmallerInCompact = 4;
+    const std::uint64_t bytes = usualBytes(twin.descriptor) / (isCompact_ ? kSmallerInCompact : 1);
     share.twins.push_back(twin.descriptor);
     share.reserved += bytes;
     left_ = less(*left_, bytes);
@@ -404,6 +419,17 @@ class ByteShares {
       if (isOther(g)) leastLeft_ += shares_[g].least = least;
   }
 
+  /// Bytes that a grid with its twins adds to a compact file with the records of those that were taken, which take few
+  /// bytes together. It depends on them by their padding only.
+  [[nodiscard]] std::uint64_t bytesInCompact(const Share& share, const StoredGrid& stored) const {
+    constexpr std::uint64_t kPadding = 8;
+    EsvrFile file = records_;
+    file.grids.push_back(stored);
+    for (const auto& descriptor : share.twins)
+      file.grids.push_back(withDescriptor(stored, descriptor));
+    return encodeEsvr(file).size() + kPadding - encodeEsvr(records_).size();
+  }
+
   /// Bytes of a converted grid with its twins.
   [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored,
                                              const StoredGrid* previous) {
@@ -419,6 +445,9 @@ class ByteShares {
   std::uint64_t leastLeft_ = 0;  ///< the least bytes of the grids that have none yet
   bool isOverdrawn_ = false;
   std::vector<Share> shares_;  ///< one for each grid; that of a twin is not used
+  bool isCompact_;
+  EsvrFile records_;  ///< of the grids that were taken, if it is compact
+  std::optional<std::uint64_t> saved_;
 };
 
 // Every grid of a file.
@@ -434,16 +463,24 @@ class GridsConversion {
   std::vector<std::optional<GridConversion>> run() {
     converter_.findScales();
     twins_ = findTwins(source_.grids, converter_);
-    ByteShares shares(source_, options_.size, twins_, {});
+    ByteShares shares(source_, options_.size, twins_, {}, isCompact());
     convertSmall();
     while (!convertAll(shares)) {
       earlier_ = std::exchange(made_, std::vector<std::optional<GridConversion>>(made_.size()));
-      shares = ByteShares(source_, options_.size, twins_, needed_);
+      shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
     }
     isOverdrawn_ = shares.isOverdrawn();
     for (const auto& [g, twin] : twins_)
       if (made_[twin.of]) made_[g] = twinOf(*made_[twin.of], g, twin);
     return std::move(made_);
+  }
+
+  /// True if grids divide a size of a compact file. In large files they would gain little, and those of a sequence
+  /// refer to the frame before.
+  [[nodiscard]] bool isCompact() const {
+    constexpr std::uint64_t kMostCompact = std::uint64_t{1} << 20;
+    return options_.size && *options_.size <= kMostCompact && options_.shares && !isEachAlone_ &&
+           !options_.previous.file && source_.grids.size() + source_.carried.size() > 1;
   }
 
   /// True if grids have more bytes than the size allows, so that the size of the file has to be looked at.
@@ -494,6 +531,11 @@ class GridsConversion {
         convert(g, shares);
       } catch (const SizeTooSmall& error) {
         if (source_.grids.size() == 1) throw;
+        // What a grid needs is known of its own bytes, and the size may have to be overdrawn by those.
+        if (isCompact()) {
+          isEachAlone_ = true;
+          return false;
+        }
         // With other bytes another fit may need a few more. These steps end such a search soon.
         needed_[g] = share + std::max(error.missing, share / 8 + 8);
         return false;
@@ -516,6 +558,7 @@ class GridsConversion {
   void convert(std::size_t g, ByteShares& shares) try {
     if (takeEarlier(g, shares)) return;
     std::optional<std::uint64_t> bytes = shares.of(g);
+    if (bytes) *bytes += shares.saved();
     GridConversion grid = converter_.make(g, {.bytes = bytes});
     const auto excessOf = [&]() -> std::uint64_t {
       const BestSoFar completion;
@@ -537,7 +580,7 @@ class GridsConversion {
   GridConverter& converter_;
   Twins twins_;
   LeastBytes needed_;
-  bool isOverdrawn_ = false;
+  bool isOverdrawn_ = false, isEachAlone_ = false;
   std::vector<std::optional<GridConversion>> made_;
   std::vector<std::optional<GridConversion>> earlier_;  ///< by another division of the size
 };
@@ -655,7 +698,7 @@ ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
   }
   encode::shareGrids(options, converter, made);
   made.interrupted = converter.isCancelled();
-  if (conversion.isOverdrawn()) {
+  if (conversion.isOverdrawn() || conversion.isCompact()) {
     made.file.layout = FileLayout::kCompact;
     requireSize(made.file, *options.size);
   }

@@ -24,6 +24,7 @@
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/voxel_sections.h"
 
 namespace esvr::encode {
 namespace {
@@ -712,8 +713,21 @@ std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput
 
 // ---- Conversions
 
+/// Every conversion considers voxels, and a section of voxels has no codes for places that are farther apart.
+void requireNear(const ConvertInput& input) {
+  constexpr std::int32_t kTooFar = std::int32_t{1} << format::kMaxBrickBits;
+  for (const Coord brick : input.source.bricks)
+    if (std::max({brick.x, brick.y, brick.z}) >= kTooFar) {
+      const Box box = activeBox(input.source);
+      throw CannotConvert("grid '" + shownName(input.descriptor.name) +
+                          "': its active voxels reach from " + toString(box.min) + " to " +
+                          toString(box.max) + ": 2^24 voxels or more");
+    }
+}
+
 Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
   requirePossible(options);
+  requireNear(input);
   const CancelScope scope(CancelScope::orToken(options.fit.cancel));
   CancelScope::check();
   if (const auto background = nearBackground(input, options))

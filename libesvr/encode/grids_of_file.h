@@ -96,4 +96,7 @@ void forEachAtOnce(std::size_t count, std::size_t threads,
 /// for this coding. (share_grids.cpp)
 void shareGrids(const FileOptions& options, GridConverter& converter, ConvertedFile& made);
 
+/// A grid without its content, of which a file has little more than the record. (share_grids.cpp)
+[[nodiscard]] StoredGrid recordAlone(const StoredGrid& grid);
+
 }  // namespace esvr::encode

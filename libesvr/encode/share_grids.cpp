@@ -167,6 +167,18 @@ class Sharing {
 
 }  // namespace
 
+StoredGrid encode::recordAlone(const StoredGrid& grid) {
+  StoredGrid record;
+  record.descriptor = grid.descriptor;
+  record.field.chunks.resize(std::min<std::size_t>(grid.field.chunks.size(), 1));
+  record.activeThreshold = grid.activeThreshold;
+  record.tone = grid.tone;
+  record.activeBox = grid.activeBox;
+  record.activeVoxels = grid.activeVoxels;
+  record.valueMin = grid.valueMin, record.valueMax = grid.valueMax;
+  return record;
+}
+
 void encode::shareGrids(const FileOptions& options, GridConverter& converter, ConvertedFile& made) {
   // The bytes of a wanted size are divided among grids that are stored on their own.
   if (!options.shares || options.size || made.grids.size() < 2) return;
@@ -185,19 +197,6 @@ std::uint64_t bytesOfSection(const SectionSummary& section) {
   return kSectionRowBytes + (section.sharedWith ? 0 : padded);
 }
 
-/// Bytes that the record of a grid adds.
-std::uint64_t bytesOfRecord(const StoredGrid& grid) {
-  StoredGrid record;
-  record.descriptor = grid.descriptor;
-  record.field.chunks.resize(std::min<std::size_t>(grid.field.chunks.size(), 1));
-  record.activeThreshold = grid.activeThreshold;
-  record.tone = grid.tone;
-  record.activeBox = grid.activeBox;
-  record.activeVoxels = grid.activeVoxels;
-  record.valueMin = grid.valueMin, record.valueMax = grid.valueMax;
-  return bytesAdded(record);
-}
-
 }  // namespace
 
 std::uint64_t bytesWithoutSharing(const ConvertedFile& converted, const EsvrSummary& written) {
@@ -209,7 +208,8 @@ std::uint64_t bytesWithoutSharing(const ConvertedFile& converted, const EsvrSumm
     if (!isJoined && section.kind != "packed sections") bytes += bytesOfSection(section);
   }
   if (areJoined)
-    for (const StoredGrid& grid : converted.file.grids) bytes += bytesOfRecord(grid);
+    for (const StoredGrid& grid : converted.file.grids)
+      bytes += bytesAdded(encode::recordAlone(grid));
   for (const GridConversion& grid : converted.grids)
     if (grid.shared && !grid.twinOf) bytes += grid.shared->bytesWithout - grid.shared->bytesWith;
   return bytes;

@@ -122,7 +122,6 @@ namespace {
 /// Limit on the number of bricks in a byte, so that a reader knows it before it allocates memory.
 /// The writer adds zeros where there would be more.
 constexpr std::uint64_t kMaxBricksPerByte = 4;
-constexpr int kMaxBrickBits = 21;
 
 /// Bytes of memory that a brick takes while it is read: its codes, its masks, and its values.
 constexpr std::uint64_t kCodeBytesPerBrick = kBrickVoxels * sizeof(std::int32_t);

@@ -18,6 +18,9 @@
 
 namespace esvr::format {
 
+/// Bits that the place of a brick may have along an axis, from the first brick on.
+inline constexpr int kMaxBrickBits = 21;
+
 // ---- Positions of bricks: one array for each axis
 
 /// \throws RuntimeFailure  the corners are not multiples of 8, or not increasing

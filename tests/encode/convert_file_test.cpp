@@ -167,7 +167,7 @@ TEST(ConvertGridsToSize, KeepsToItWithAGridOfAFewVoxels) {
       fileOf({{"large", test::smoothVolume()}, {"tiny", softBall({}, 1.0f, 3.0)}});
   const std::uint64_t bytes = encodeEsvr(convertGrids(file, sizedOptions(kSize)).file).size();
   EXPECT_LE(bytes, kSize);
-  EXPECT_GE(double(bytes), 0.95 * double(kSize));
+  EXPECT_GE(double(bytes), 0.9 * double(kSize));
 }
 
 /// Each ball is in a chunk of its own, and a twin has a row of the table for each of them. That is more than
@@ -189,7 +189,7 @@ TEST(ConvertGridsToSize, KeepsToItWhereTwinsHaveManySections) {
   EXPECT_EQ(made.grids[1].twinOf, std::size_t{0});
   const std::uint64_t bytes = encodeEsvr(made.file).size();
   EXPECT_LE(bytes, kSize);
-  EXPECT_GE(double(bytes), 0.9 * double(kSize));
+  EXPECT_GE(double(bytes), 0.85 * double(kSize));
 }
 
 TEST(ConvertGridsToSize, RefusesWhatLeavesNothingForTheGrids) {
@@ -221,6 +221,21 @@ TEST(ConvertGridsToSize, GivesAGridTheBytesThatItNeeds) {
     EXPECT_LE(bytes, kSize);
     EXPECT_GE(double(bytes), 0.9 * double(kSize));
   }
+}
+
+/// Many grids have records and rows that take few bytes in a compact file.
+TEST(ConvertGridsToSize, OfManyGridsIsNearlyUsedUp) {
+  constexpr std::uint64_t kSize = 10'000;
+  const SparseVolume cloud = test::smoothVolume();
+  std::vector<std::pair<std::string, SparseVolume>> grids;
+  for (int g = 0; g < 12; ++g) {
+    grids.push_back({"grid " + std::to_string(g), cloud});
+    for (float& value : grids.back().second.values) value *= float(g + 1);
+  }
+  const std::uint64_t bytes =
+      encodeEsvr(convertGrids(fileOf(grids), sizedOptions(kSize)).file).size();
+  EXPECT_LE(bytes, kSize);
+  EXPECT_GE(double(bytes), 0.9 * double(kSize));
 }
 
 TEST(ConvertGridsToSize, IsRefusedIfNothingFits) {

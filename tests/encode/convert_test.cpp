@@ -10,6 +10,7 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -312,6 +313,27 @@ TEST(FarBackground, TakesNoThresholdAndNeedsADecoding) {
       converted(pressureVolume(), PsnrGoal{30.0}, Representation::kEllipsoids).grid;
   EXPECT_THROW((void)decodeGrid(grid, {.threshold = 1.0f}), UsageError);
   EXPECT_FALSE(followsFromEllipsoids(grid));
+}
+
+TEST(ConvertVolume, RefusesVoxelsThatLieTooFarApartForAFile) {
+  const auto twoBricks = [](std::int32_t distance) {
+    BrickInput first{{0, 0, 0}, {}, {}}, second{{distance, 0, 0}, {}, {}};
+    for (BrickInput* brick : {&first, &second}) brick->values[0] = 1.0f, brick->active.set(0);
+    return makeVolume({first, second}, 0.0f);
+  };
+  constexpr std::int32_t kTooFar = 1 << 24;
+  EXPECT_EQ(
+      decodeGrid(
+          converted(twoBricks(kTooFar - kBrickSide), LosslessGoal{}, Representation::kVoxels).grid)
+          .brickCount(),
+      2u);
+  for (const Goal& goal : {Goal{LosslessGoal{}}, Goal{PresetGoal{}}, Goal{FitGoal{}}}) try {
+      (void)converted(twoBricks(kTooFar), goal, Representation::kAuto);
+      FAIL();
+    } catch (const CannotConvert& error) {
+      EXPECT_NE(std::string(error.what()).find("to (16777216, 0, 0): 2^24 voxels or more"),
+                std::string::npos);
+    }
 }
 
 TEST(FarBackground, IsNotThatOfAScanFromAThresholdOn) {

@@ -243,6 +243,7 @@ struct Conversion {
 /// float32; such a grid is stored as voxels.
 /// \throws BadInput  values are too large for sums, and the goal or an option needs ellipsoids (the
 ///                   text names the grid and the voxel)
+/// \throws CannotConvert  active voxels are 2^24 voxels or more apart
 /// \throws RuntimeFailure  the stored grid exceeds its bound; a voxel of a narrow band has another
 ///                         sign than in the source (the text names the grid and the voxel)
 /// Other exceptions are those of fit and compactGrid.
