@@ -46,7 +46,7 @@ using Attributes = std::vector<Attribute>;
 
 /// What a page says.
 struct HtmlPage {
-  std::string title{};                    ///< what the page is about
+  std::string title{};                    ///< names the subject of the page
   std::string finding{};                  ///< its headline; if it is empty, the title is
   std::vector<std::string> paragraphs{};  ///< empty ones are left out
   std::vector<Html> sections{};

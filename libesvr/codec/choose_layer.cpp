@@ -205,7 +205,7 @@ double largestMagnitude(const SparseVolume& volume) {
   return parallelReduce(
       Range(0, volume.brickCount()), 0.0f,
       [&](const Range& bricks, float largest) {
-        constexpr std::size_t kLanes = 8;  // of a SIMD vector
+        constexpr std::size_t kLanes = 8;  // as many as a SIMD vector has
         float lanes[kLanes] = {};
         for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
           for (std::size_t v = 0; v < kBrickVoxels; v += kLanes)

@@ -159,7 +159,7 @@ class PastVoxels {
 
   const VoxelLayer& past_;
   BrickIndex index_;
-  Coord shift_;                ///< what is added to places in the previous frame, in bricks
+  Coord shift_;                ///< this is added to places in the previous frame, in bricks
   double vacantPlace_ = 0.0;   ///< place of voxels that are vacant or have no brick
   VoxelArray<double> places_;  ///< places of all voxels of the previous frame
 };

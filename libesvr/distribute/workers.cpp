@@ -180,7 +180,7 @@ void PartStore::remove() {
     if (isOurName(at->path().filename().string())) ours.push_back(at->path());
   for (const fs::path& file : ours) fs::remove(file, ignored);
   removeLeftOvers(folder_);
-  ::rmdir(folder_.c_str());  // which fails if files of others are in it, or if it is a link
+  ::rmdir(folder_.c_str());  // rmdir fails if files of others are in it, or if it is a link
 }
 
 // ---- Ranks

@@ -446,7 +446,7 @@ class ByteShares {
   bool isOverdrawn_ = false;
   std::vector<Share> shares_;  ///< one for each grid; that of a twin is not used
   bool isCompact_;
-  EsvrFile records_;  ///< of the grids that were taken, if it is compact
+  EsvrFile records_;  ///< records of the grids that were taken, if the file is compact
   std::optional<std::uint64_t> saved_;
 };
 

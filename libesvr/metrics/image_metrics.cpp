@@ -22,7 +22,7 @@
 
 namespace esvr::metrics {
 
-inline constexpr int kChannels = 4, kColors = 3;  ///< of a pixel
+inline constexpr int kChannels = 4, kColors = 3;  ///< a pixel has so many
 
 /// \throws UsageError  the pictures have no pixel or differ in size
 inline void requireEqualSizes(const Image& reference, const Image& candidate) {

@@ -128,7 +128,7 @@ enum class VoxelForm {
 /// The section of a file that holds a voxel layer, kept so that the layer is coded once. It counts only
 /// while the layer is the same, which its checksum shows, and layers are compared without it.
 struct CodedVoxels {
-  std::uint64_t checksum = 0;                             ///< of the layer that was coded
+  std::uint64_t checksum = 0;                             ///< checksum of the layer that was coded
   std::shared_ptr<const std::vector<std::byte>> section;  ///< null: not coded yet
 
   friend bool operator==(const CodedVoxels&, const CodedVoxels&) { return true; }
