@@ -105,7 +105,7 @@ void takeFigures(const RunRecord& run, FrameRecord& frame) {
     const auto light = m.transmittance ? std::optional(m.transmittance->psnr50) : std::nullopt;
     frame.grids.push_back(
         {grid.uniqueName, grid.stored().field.ellipsoidCount(), m.psnrBox, m.psnrActive, light});
-    frame.keys.push_back(grid.key);
+    frame.before.push_back({grid.key, grid.conversion.compact});
   }
   for (const NotFitted& left : run.carried)
     frame.carried.push_back({left.grid.uniqueName, left.why});

@@ -109,8 +109,8 @@ struct FrameRecord {
   std::optional<std::size_t> group{};  ///< index of its group in a file for all frames
   bool gridsDiffer = false;            ///< it begins a group because its grids differ
   std::optional<Error> failure{};
-  nlohmann::ordered_json report{};  ///< the frame's own report, if one is wanted
-  std::vector<SourceKey> keys{};    ///< FrameBefore::keys for the next frame of its group
+  nlohmann::ordered_json report{};   ///< the frame's own report, if one is wanted
+  std::vector<GridBefore> before{};  ///< FrameBefore::grids for the next frame of its group
 };
 
 /// The figures of a file for all frames.

@@ -472,10 +472,10 @@ class GroupConversion {
     FrameRecord& frame = conversion_.frames()[index];
     Options own = conversion_.optionsOf(frame.frame, worker_);
     own.resume = false;  // the group is converted again as a whole
-    if (previous_) own.previous = {&*previous_, keys_};
+    if (previous_) own.previous = {&*previous_, before_};
     conversion_.convert(own, frame, [&](const EsvrFile& file) { return encode(index, file); });
     keepEncoded();
-    keys_ = std::exchange(frame.keys, {});
+    before_ = std::exchange(frame.before, {});
   }
 
   void hold(std::size_t index) {
@@ -511,7 +511,7 @@ class GroupConversion {
   bool isWell_ = true;
   std::vector<EncodedFrame> encoded_;
   std::optional<EsvrFile> previous_;  ///< the last frame of the group as a reader gets it
-  std::vector<SourceKey> keys_;       ///< of its grids
+  std::vector<GridBefore> before_;    ///< FrameBefore::grids of it
   EncodedFrame last_;                 ///< the frame that was encoded last
   EsvrFile decoded_;                  ///< the same as a reader gets it
 };

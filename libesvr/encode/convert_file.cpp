@@ -130,13 +130,19 @@ bool GridConverter::needsExactSet(std::size_t g, const VolumeGrid& source) const
                                             source.descriptor.transform}) != sets_.end();
 }
 
+/// What is known of a grid of the previous frame; null if nothing is.
+const GridBefore* GridConverter::recordOf(const StoredGrid* previous) const {
+  if (!previous) return nullptr;
+  const auto& [file, grids] = options_.previous;
+  const auto at = std::size_t(previous - file->grids.data());
+  return at < grids.size() ? &grids[at] : nullptr;
+}
+
 /// True if the same grid of the previous frame was made from the same source.
 bool GridConverter::isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
                                const SourceKey& key) const {
-  if (!previous) return false;
-  const auto& [file, keys] = options_.previous;
-  const auto at = std::size_t(previous - file->grids.data());
-  return at < keys.size() && keys[at] == key &&
+  const GridBefore* before = recordOf(previous);
+  return before && before->key == key &&
          previous->descriptor.valueType == source.descriptor.valueType;
 }
 
@@ -204,9 +210,11 @@ void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish&
   if (!wish.bytes && needsExactSet(g, source)) options.storage.activity = Activity::kExact;
   const StoredGrid* const previous = previousOf(g);
   options.previous = wish.expected ? wish.expected : previous;
+  if (const GridBefore* before = recordOf(previous)) options.previousCompact = before->compact;
   if (!wish.expected && isAsBefore(previous, source, made.key)) {
     made.asBefore = true;
     made.conversion.grid = *previous;
+    made.conversion.compact = options.previousCompact;
     made.conversion.grid.descriptor = source.descriptor;
     made.conversion.grid.reference.reset();  // it may name another grid of this file
   } else if (options_.paper) {

@@ -233,8 +233,6 @@ constexpr double kMostOfFirstDraft = 6000.0, kFar = 4.0;
 constexpr double kMostOfScout = 1000.0, kMostOfLargeScout = 2000.0, kBricksOfScout = 20.0;
 /// Largest factor of the number between two fits, and the smallest of a fit that follows a missed PSNR.
 constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
-/// The number of ellipsoids with which a frame begins, relative to that of the frame before (Lab, "Frames that continue").
-constexpr double kFewerInFrame = 0.95;
 /// Active voxels for each ellipsoid and number of ellipsoids from which on fits to averages are tried, the largest number of
 /// iterations of a whole one, and the largest share of the squared error that averaging may have (Lab, "Fits to averages").
 /// Fits of fewer ellipsoids take little time, and one more or less decides.
@@ -343,10 +341,15 @@ Attempt attempted(const Job& job, const FitOptions& options) {
   result.asked = *options.count;
   result.fit = fitted(job, options);
   result.grid = storedGridOf(job, result.fit);
+  const SparseVolume& source = job.input.source;
   const auto judged = unlessCancelled([&]() -> std::optional<Judge::Judgement> {
     if (result.cancelled()) return std::nullopt;
-    if (!job.judge) return Judge::Judgement{psnrOf(job, result.grid)};
-    return (*job.judge)(decodeGrid(result.grid, {.memory = memoryOf(job.input.source)}));
+    SparseVolume decoded = decodeGrid(result.grid, {.memory = memoryOf(source)});
+    if (job.averages)
+      result.psnrOfVoxels =
+          psnrOverBox(source, decoded, {.peak = options.peak ? *options.peak : peakOf(source)});
+    if (!job.judge) return Judge::Judgement{psnrOf(job, std::move(decoded))};
+    return (*job.judge)(std::move(decoded));
   });
   if (!judged) result.fit.end = FitEnd::kCancelled;
   result.psnr = judged ? judged->quality : lastPsnr(result.fit);
@@ -431,9 +434,19 @@ CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions 
   return compactedTo(job_, attempt.grid, attempt.fit, target);
 }
 
+/// The steps of the frame before, made finer or coarser for a loss in dB. The error that they add grows with the square of
+/// the steps.
+QuantiserSteps EllipsoidSearch::stepsOfFrameBefore(double loss) const {
+  const auto added = [](double dB) {
+    return std::pow(10.0, std::max(dB, kLeastLoss) / 10.0) - 1.0;
+  };
+  const CompactRecord& before = *options_.previousCompact;
+  return finer(before.steps, 0.5 * std::log2(added(before.loss) / added(loss)));
+}
+
 /// The smallest conversion of an attempt with the PSNR of the goal. Rate control knows the error over the
-/// box alone, by which it finds the proportions of the steps. A judge's PSNR loses about as many dB, which is measured;
-/// where it misses the goal or exceeds it, all steps are scaled.
+/// box alone, by which it finds the proportions of the steps, unless the frame before has them. A judge's PSNR loses about
+/// as many dB, which is measured; where it misses the goal or exceeds it, all steps are scaled.
 Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
   if (!job_.judge || !compact_)
     return storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
@@ -444,10 +457,12 @@ Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
     return roundedBy(job_, attempt.grid, attempt.fit, {.loss = loss},
                      [&](const CompactOptions& options) {
                        if (!compactor) compactor.emplace(attempt.grid, job_.input.source, options);
-                       return steps ? compactor->at(*steps) : compactor->toGoal();
+                       return steps ? compactor->at(*steps) : compactor->nearLoss();
                      });
   };
-  CompactResult made = rounded(nullptr);
+  std::optional<QuantiserSteps> known;
+  if (goal_.before && options_.previousCompact) known = stepsOfFrameBefore(loss);
+  CompactResult made = rounded(known ? &*known : nullptr);
   const QuantiserSteps steps = made.steps;
   // The loss, dB, falls by a factor of 4 for an octave.
   RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, *goal_.psnr + 0.5 * kPsnrSpare,
@@ -554,15 +569,15 @@ bool EllipsoidSearch::mayFitAverages(double count) const {
          count >= kFewestOfAverages && voxels >= kVoxelsOfAverages * count;
 }
 
+namespace {
+
 /// The share of the squared error of a fit to averages that is due to the averaging: its error over the averages is less
 /// by the variance within these.
-double EllipsoidSearch::shareOfAveraging(const Attempt& attempt) const {
-  const SparseVolume& source = job_.input.source;
-  const double peak = options_.fit.peak ? *options_.fit.peak : peakOf(source);
-  const double psnr =
-      psnrOverBox(source, decodeGrid(attempt.grid, {.memory = memoryOf(source)}), {.peak = peak});
-  return 1.0 - std::pow(10.0, (psnr - lastPsnr(attempt.fit)) / 10.0);
+double shareOfAveraging(const Attempt& attempt) {
+  return 1.0 - std::pow(10.0, (attempt.psnrOfVoxels - lastPsnr(attempt.fit)) / 10.0);
 }
+
+}  // namespace
 
 /// Whether averages will do for the quality of the goal, by the short fit. The error that is due to them stays.
 bool EllipsoidSearch::averagesSuffice() const {
@@ -634,8 +649,17 @@ void EllipsoidSearch::draftNearPsnr() {
   }
 }
 
+/// The number of ellipsoids of a frame. With that of the frame before, rounding would lose as much as there; where this is
+/// more than usual, fewer ellipsoids will do, and where it is less, a few more are needed.
+double EllipsoidSearch::countOfFrame(const StoredGrid& before) const {
+  const auto& rounded = options_.previousCompact;
+  const double spare = rounded ? rounding_.factor * (rounded->loss - rounding_.usualLoss) : 0.0;
+  const double change =
+      std::clamp(std::exp2(-0.5 * spare / slope_), kLeastGrowth, 1.0 / kLeastGrowth);
+  return capped(change * double(before.field.ellipsoidCount()));
+}
+
 /// A fit that continues the ellipsoids of the frame before takes the place of the short ones, and is the first whole one.
-/// It has a few less, so that their number falls where fewer will do.
 void EllipsoidSearch::continueFrame() {
   const StoredGrid& before = *goal_.before;
   const auto hasNegative = [](const Chunk& chunk) {
@@ -645,7 +669,7 @@ void EllipsoidSearch::continueFrame() {
     options_.fit.bothSigns = std::ranges::any_of(before.field.chunks, hasNegative);
   const double bytes = double(bytesOfEllipsoids(before));
   const double share = kTuning.continuedFrameShare * std::min(1.0, bytes / kTuning.bytesOfWholeFit);
-  const double count = capped(kFewerInFrame * double(before.field.ellipsoidCount()));
+  const double count = countOfFrame(before);
   if (mayFitAverages(count)) fitAverages();
   draft_ = continued(before, count, share);
   if (!averagesSuffice()) {
@@ -683,15 +707,20 @@ void EllipsoidSearch::decideSigns() {
 
 /// Takes the price of an ellipsoid and the bytes of the other sections from the short fit. The price is
 /// known to a quarter without a search for the best steps, which decides enough for a PSNR. The number of
-/// ellipsoids of a size follows from it.
+/// ellipsoids of a size follows from it. In a frame, the price is that of the frame before.
 void EllipsoidSearch::forecast() {
   if (draft_->cancelled() || !compact_) return;
-  const bool isQuick = goal_.psnr.has_value();
-  const CompactResult compact =
-      compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
-  price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
-  const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
-  besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
+  if (goal_.before) {
+    price_ =
+        double(bytesOfEllipsoids(*goal_.before)) / double(goal_.before->field.ellipsoidCount());
+  } else {
+    const bool isQuick = goal_.psnr.has_value();
+    const CompactResult compact =
+        compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
+    price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
+    const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
+    besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
+  }
   const double bytes =
       goal_.psnr ? price_ * countFor(drafted_, aim() - behind(), slope_) : double(*goal_.bytes);
   const double share = std::min(1.0, bytes / kTuning.bytesOfWholeFit);

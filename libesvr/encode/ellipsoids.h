@@ -17,6 +17,8 @@ struct Attempt {
   StoredGrid grid;        ///< grid in float32
   double psnr = 0.0;      ///< quality, dB
   double forTones = 0.0;  ///< Judge::Judgement::forTones
+  /// PSNR over the box of the input, dB, if the fit is one to its averages, of which the fit's own PSNR is.
+  double psnrOfVoxels = 0.0;
   std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
 
   [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
@@ -110,6 +112,7 @@ class EllipsoidSearch {
   [[nodiscard]] Attempt continued(const StoredGrid& from, double count, double share) const;
   [[nodiscard]] const Attempt* startFor(double count) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
+  [[nodiscard]] QuantiserSteps stepsOfFrameBefore(double loss) const;
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
   [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
   [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
@@ -117,10 +120,10 @@ class EllipsoidSearch {
   void draftNearPsnr();
   void draftFirst();
   [[nodiscard]] bool mayFitAverages(double count) const;
-  [[nodiscard]] double shareOfAveraging(const Attempt& attempt) const;
   [[nodiscard]] bool averagesSuffice() const;
   void fitAverages();
   void fitVoxels();
+  [[nodiscard]] double countOfFrame(const StoredGrid& before) const;
   void continueFrame();
   void decideSigns();
   void forecast();

@@ -76,6 +76,7 @@ class GridConverter {
   void convert(std::size_t g, const VolumeGrid& source, const Wish& wish, ConvertOptions options,
                GridConversion& made) const;
   [[nodiscard]] bool needsExactSet(std::size_t g, const VolumeGrid& source) const;
+  [[nodiscard]] const GridBefore* recordOf(const StoredGrid* previous) const;
   [[nodiscard]] bool isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
                                 const SourceKey& key) const;
 

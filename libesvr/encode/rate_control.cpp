@@ -307,10 +307,8 @@ RateTrial approach(RateTrials& trials, const StepGoal& goal, const QuantiserStep
 }
 
 /// Scales all steps together until the limit is used well.
-/// \param fineness  octaves by which the first trial is finer than `steps`
-RateTrial scaleTo(RateTrials& trials, const StepGoal& goal, const QuantiserSteps& steps,
-                  double fineness = 0.0) {
-  RootSearch search = goal.search(fineness);
+RateTrial scaleTo(RateTrials& trials, const StepGoal& goal, const QuantiserSteps& steps) {
+  RootSearch search = goal.search(0.0);
   std::optional<RateTrial> best;
   for (int n = 0; n < kMaxTrials && !(search.ended() && best && goal.met(*best)); ++n) {
     RateTrial trial = trials.make(finer(steps, search.next()));
@@ -369,10 +367,15 @@ RateTrial balanced(RateTrials& trials, const RateTrial& here) {
           std::uint64_t(std::max(double(here.bytes) - saved, 0.0))};
 }
 
+/// Steps in the best proportions for a goal, which should just meet it.
+QuantiserSteps stepsFor(RateTrials& trials, const StepGoal& goal, const QuantiserSteps& guess) {
+  const RateTrial expected = balanced(trials, approach(trials, goal, guess));
+  return finer(expected.steps, (goal.aim() - goal.figure(expected)) / goal.slope());
+}
+
 /// The best steps for a goal. If no trial meets it, the result is the one that misses it by the least.
 RateTrial chooseSteps(RateTrials& trials, const StepGoal& goal, const QuantiserSteps& guess) {
-  const RateTrial expected = balanced(trials, approach(trials, goal, guess));
-  return scaleTo(trials, goal, expected.steps, (goal.aim() - goal.figure(expected)) / goal.slope());
+  return scaleTo(trials, goal, stepsFor(trials, goal, guess));
 }
 
 StepGoal errorGoal(const RateTrials& trials, double allowed) {
@@ -411,7 +414,8 @@ double allowedError(const RateTrials& trials, const CompactOptions& options) {
   return trials.error() * std::pow(10.0, options.loss / 10.0) + trials.negligibleError();
 }
 
-RateTrial chosen(RateTrials& trials, const CompactOptions& options) {
+/// \param searches  false: a limit of the error is met by one trial more or less
+RateTrial chosen(RateTrials& trials, const CompactOptions& options, bool searches = true) {
   if (options.bytes)
     return options.quick
                ? scaleTo(trials, bytesGoal(trials, *options.bytes), usualSteps(trials))
@@ -420,7 +424,8 @@ RateTrial chosen(RateTrials& trials, const CompactOptions& options) {
   const QuantiserSteps guess = stepsWithin(trials, allowed);
   if (options.quick) return trials.make(guess);
   if (trials.leastError() >= allowed) return trials.make(scaled(guess, kFinestFactor));
-  return chooseSteps(trials, errorGoal(trials, allowed), guess);
+  const StepGoal goal = errorGoal(trials, allowed);
+  return searches ? chooseSteps(trials, goal, guess) : trials.make(stepsFor(trials, goal, guess));
 }
 
 /// What the PSNR of a result exceeds the wanted one by, dB.
@@ -502,6 +507,11 @@ Compactor::Compactor(const StoredGrid& grid, const SparseVolume& source,
 CompactResult Compactor::toGoal() {
   if (!trials_) return {grid_, {}, 0.0, 0};
   return resultOf(chosen(*trials_, options_));
+}
+
+CompactResult Compactor::nearLoss() {
+  if (!trials_) return {grid_, {}, 0.0, 0};
+  return resultOf(chosen(*trials_, options_, false));
 }
 
 CompactResult Compactor::at(const QuantiserSteps& steps) {

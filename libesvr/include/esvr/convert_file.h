@@ -118,12 +118,18 @@ struct GridStep {
   const std::function<void()>& run;
 };
 
+/// What a conversion knows of a grid of the frame before, and a reader does not: GridConversion::key, and how its
+/// ellipsoids were rounded.
+struct GridBefore {
+  SourceKey
+      key;  ///< a grid with the same one is that of the frame before, so that a scene that stands still does not change
+  std::optional<CompactRecord> compact{};
+};
+
 /// The frame before in a sequence, as a reader gets it.
 struct FrameBefore {
-  const EsvrFile* file = nullptr;  ///< null: there is none
-  /// GridConversion::key of its grids. A grid with the same key is that of the previous frame, so that a scene
-  /// that stands still does not change.
-  std::span<const SourceKey> keys{};
+  const EsvrFile* file = nullptr;       ///< null: there is none
+  std::span<const GridBefore> grids{};  ///< those of the file, in their order
 };
 
 struct FileOptions {

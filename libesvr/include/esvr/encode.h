@@ -138,6 +138,12 @@ struct StorageOptions {
 /// The effort of conversions unless options say otherwise, and its limits.
 inline constexpr int kUsualEffort = 5, kLeastEffort = 1, kMostEffort = 9;
 
+/// The outcome of quantising the ellipsoids.
+struct CompactRecord {
+  double loss = 0.0;     ///< loss of PSNR over the box against float32, dB
+  QuantiserSteps steps;  ///< quantisation steps of the four streams
+};
+
 struct ConvertOptions {
   Goal goal;
   /// How long a conversion may take, from kLeastEffort to kMostEffort. The least one makes no fits, so that voxels are
@@ -162,6 +168,8 @@ struct ConvertOptions {
   /// are predicted from its voxels, and a fit continues its ellipsoids, which takes less time than a search. Where that
   /// takes many more bytes, or misses the goal, the frame is converted as if it stood alone.
   const StoredGrid* previous = nullptr;
+  /// How the ellipsoids of `previous` were rounded. Those of the frame are rounded alike, or a little more or less.
+  std::optional<CompactRecord> previousCompact{};
   /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
   /// convertVolume() where the source has values that are not finite.
   std::uint64_t filledVoxels = 0;
@@ -186,12 +194,6 @@ struct InputKey {
   friend auto operator<=>(const InputKey&, const InputKey&) = default;
 };
 [[nodiscard]] InputKey keyOf(const ConvertInput& input);
-
-/// The outcome of quantising the ellipsoids.
-struct CompactRecord {
-  double loss = 0.0;     ///< loss of PSNR over the box against float32, dB
-  QuantiserSteps steps;  ///< quantisation steps of the four streams
-};
 
 /// A grid that was considered for a goal.
 struct Candidate {
