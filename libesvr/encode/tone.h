@@ -34,8 +34,10 @@ class Judge {
 
   /// The total mass of the source; 0 unless pictures are seen.
   [[nodiscard]] double mass() const { return mass_; }
-  /// The total mass of the values of tones that are multiplied by a factor.
-  [[nodiscard]] double massOf(const SparseVolume& tones, double factor = 1.0) const;
+  /// The total mass of the values of tones.
+  [[nodiscard]] double massOf(const SparseVolume& tones) const {
+    return growingMass(tones, 1.0).total;
+  }
 
   /// The factor of decoded tones with which their mass is the wanted one: that of the source, or of a sample of it.
   [[nodiscard]] double massFactor(double wanted, const SparseVolume& decoded) const;
@@ -46,6 +48,12 @@ class Judge {
  private:
   void toValues(SparseVolume& volume) const;
   void toValues(std::span<const float> tones, float factor, std::span<float> values) const;
+
+  /// The total mass of the values of tones that are multiplied by a factor, and its growth with the factor.
+  struct Mass {
+    double total = 0.0, growth = 0.0;
+  };
+  [[nodiscard]] Mass growingMass(const SparseVolume& tones, double factor) const;
 
   const SparseVolume& values_;
   const VoxelLayer* filled_;  ///< ConvertOptions::filled

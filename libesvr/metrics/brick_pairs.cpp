@@ -143,7 +143,7 @@ struct Prefix {
 std::vector<std::uint64_t> countDigits(std::span<const BrickPair> pairs, const Prefix& prefix) {
   using Range = tbb::blocked_range<std::size_t>;
   using Histogram = std::vector<std::uint64_t>;
-  constexpr std::size_t kPairsPerTask = 4096;  // large, since a task's counters take 512 KB
+  constexpr std::size_t kPairsPerTask = 512;  // large, since a task's counters take 512 KB
   return parallelReduce(
       Range(0, pairs.size(), kPairsPerTask), Histogram(kDigits),
       [&](const Range& range, Histogram counts) {

@@ -185,7 +185,8 @@ struct Frame {
   Conversion conversion;
   std::optional<std::size_t> begins;
 };
-Frame frameOf(const SparseVolume& volume, const StoredGrid* previous) {
+Frame frameOf(const SparseVolume& volume, const StoredGrid* previous,
+              const std::optional<CompactRecord>& compact = {}) {
   Frame made;
   ConvertOptions options;
   options.goal = PsnrGoal{35.0};
@@ -195,6 +196,7 @@ Frame frameOf(const SparseVolume& volume, const StoredGrid* previous) {
     if (!made.begins) made.begins = progress.point.ellipsoids;
   };
   options.previous = previous;
+  options.previousCompact = compact;
   made.conversion = convertVolume({{}, volume}, options);
   return made;
 }
@@ -205,7 +207,7 @@ TEST(ChoiceForAFrame, SlowContinuesTheEllipsoidsOfTheFrameBefore) {
   const SparseVolume moved = test::smoothVolume(1.0);
   const Frame alone = frameOf(moved, nullptr), next = frameOf(moved, &first.conversion.grid);
   const double before = double(first.conversion.grid.field.ellipsoidCount());
-  EXPECT_NEAR(double(*next.begins), 0.855 * before, 1.0 + 0.01 * before);
+  EXPECT_NEAR(double(*next.begins), 0.9 * before, 1.0 + 0.01 * before);
   EXPECT_GT(double(*alone.begins), before) << "a search of its own begins with another number";
   ASSERT_FALSE(next.conversion.grid.voxels);
   EXPECT_FALSE(next.conversion.choice->voxels) << "no voxels are tried";
@@ -213,6 +215,20 @@ TEST(ChoiceForAFrame, SlowContinuesTheEllipsoidsOfTheFrameBefore) {
   EXPECT_GE(psnrOver(moved, next.conversion), 35.0);
   EXPECT_LT(double(bytesAdded(next.conversion.grid)),
             1.1 * double(bytesAdded(alone.conversion.grid)));
+}
+
+TEST(ChoiceForAFrame, SlowHasFewerEllipsoidsWhereTheFrameBeforeWasRoundedMore) {
+  const SparseVolume volume = test::smoothVolume(), moved = test::smoothVolume(1.0);
+  const Frame first = frameOf(volume, nullptr);
+  ASSERT_TRUE(first.conversion.compact);
+  const auto begins = [&](double loss) {
+    const CompactRecord record{loss, first.conversion.compact->steps};
+    const Frame next = frameOf(moved, &first.conversion.grid, record);
+    EXPECT_GE(psnrOver(moved, next.conversion), 35.0) << "after a loss of " << loss << " dB";
+    return *next.begins;
+  };
+  const std::size_t fine = begins(0.1), coarse = begins(2.0);
+  EXPECT_LT(coarse, fine);
 }
 
 TEST(ChoiceForAFrame, SlowIsSearchedAnewWhereTheSceneChanges) {

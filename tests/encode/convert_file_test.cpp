@@ -471,9 +471,10 @@ TEST(ConvertGrids, KeepsTheGridsOfTheFrameBeforeWhereNothingMoves) {
       fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({5, 0, 0}, 1.0f, 4.0)}});
   FileOptions options = fileOptions(PresetGoal{});
   const ConvertedFile first = convertGrids(still, options);
-  std::vector<SourceKey> keys;
-  for (const GridConversion& grid : first.grids) keys.push_back(grid.key);
-  options.previous = {&first.file, keys};
+  std::vector<GridBefore> before;
+  for (const GridConversion& grid : first.grids)
+    before.push_back({grid.key, grid.conversion.compact});
+  options.previous = {&first.file, before};
   const FileSource moved =
       fileOf({{"a", softBall({}, 1.0f)}, {"b", softBall({6, 0, 0}, 1.0f, 4.0)}});
   const ConvertedFile second = convertGrids(moved, options);
