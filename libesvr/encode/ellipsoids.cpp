@@ -249,7 +249,7 @@ constexpr std::uint64_t kRefillDivisor = 100;
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kMostFiner = 3.0,
                  kNarrowestFiner = 0.02, kPsnrSpare = 0.08;
 constexpr int kMostRoundings = 4;
-/// A judge's PSNR is that of scaled sums, from which that of a reader, who decodes, differs by 1e-7 dB.
+/// A judge's PSNR is that of scaled sums, from which that of a reader, who decodes, differs by a few 1e-6 dB.
 constexpr double kJudgedMargin = 1e-5;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
 constexpr double kMostBehind = 2.5;

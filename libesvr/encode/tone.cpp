@@ -248,9 +248,19 @@ ToneCurve likelyTone(const SparseVolume& volume) {
 
 /// What a short fit with a curve shows.
 struct Scouted {
-  FitPoint point;
+  FitPoint point;  ///< with the quality that is judged
   double forTones = 0.0;
 };
+
+/// True if a curve is better than none: pictures of thin and of dense smoke are, or the quality that is judged is much
+/// higher and they are nearly as good.
+bool isBetter(const Scouted& with, const Scouted& without) {
+  const double pictures = with.forTones - without.forTones;
+  const double quality = with.point.psnr - without.point.psnr;
+  return pictures > kTuning.toneGain ||
+         (quality > kTuning.toneQualityGain && pictures > -kTuning.mostToneLoss);
+}
+
 Scouted scouted(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options,
                 double count) {
   const Judge judge(input, options, tone);
@@ -278,8 +288,8 @@ ToneChoice chosenByFits(ToneCurve likely, const ConvertInput& given,
   if (isCoarse) options.filledVoxels = 0, options.filled = nullptr;
   const Scouted with = scouted(likely, input, options, count),
                 without = scouted({}, input, options, count);
-  const bool isBetter = with.forTones - without.forTones > kTuning.toneGain;
-  ToneChoice choice{isBetter ? likely : ToneCurve{}, isBetter ? with.point : without.point};
+  const bool isOn = isBetter(with, without);
+  ToneChoice choice{isOn ? likely : ToneCurve{}, isOn ? with.point : without.point};
   if (isCoarse) choice.scout->psnr -= kAveragesAbove;
   return choice;
 }
