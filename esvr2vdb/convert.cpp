@@ -384,6 +384,17 @@ void tellNotCompared(const std::vector<ListedGrid>& chosen, const cli::Log& log)
                   "\" was carried unchanged, and is not compared with the reference");
 }
 
+/// Warns of grids whose ellipsoids another program may evaluate to other values.
+void tellImprecise(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
+                   const cli::Log& log) {
+  for (const auto& [grid, name, place] : chosen) {
+    if (grid.isCarried) continue;
+    for (const StoredGrid& part : storedParts(file, grid))
+      if (const std::string why = whyImprecise(part); !why.empty())
+        log.warning("grid \"" + shownName(name) + "\": " + why);
+  }
+}
+
 /// Warns of grids that come back whole, although a part of their ellipsoids was asked for.
 void tellUncut(const EsvrFile& file, const std::vector<ListedGrid>& chosen, const Options& options,
                const cli::Log& log) {
@@ -477,6 +488,7 @@ void convertContent(const Options& given, const EsvrFile& file, const CancelToke
   tellLostMetadata(file, grids, options, log);
   tellHalfGrids(file, chosen, options, log);
   tellUncut(file, chosen, options, log);
+  tellImprecise(file, chosen, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
   if (options.reference) {
     tellNotCompared(chosen, log);

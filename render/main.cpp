@@ -450,9 +450,13 @@ void reportTransform(const Options& options, const std::vector<Scene>& scenes) {
           "as cubes");
 }
 
-/// Warns that float32 has no digits left for the colors of values.
-void reportTinyValues(const Options& options, const std::vector<Scene>& scenes) {
+/// Warns of values and ellipsoids for which float32 has few digits or none.
+void reportPrecision(const Options& options, const std::vector<Scene>& scenes) {
   for (const Scene& scene : scenes) {
+    if (scene.encoded)
+      if (const std::string why = whyImprecise(*scene.encoded); !why.empty())
+        cli::Log(kProgram, options.verbosity)
+            .warning(options.input.string() + ", " + scene.grid + ": " + why);
     const float largest = std::max(std::abs(scene.data.min), std::abs(scene.data.max));
     if (largest == 0.0f || largest >= std::numeric_limits<float>::min()) continue;
     cli::Log(kProgram, options.verbosity)
@@ -501,7 +505,7 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
   InputFrames input(options);
   const auto all = scenesOfAll(options, input);
   reportTransform(options, all);
-  reportTinyValues(options, all);
+  reportPrecision(options, all);
   RenderOptions r = renderOptions(options, all);
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
@@ -535,7 +539,7 @@ void run(const Options& options) {
   if (options.frames) return drawSequence(options, settings, interrupts.token());
   auto scenes = readScenes(sceneFile(options, options.input));
   reportTransform(options, scenes);
-  reportTinyValues(options, scenes);
+  reportPrecision(options, scenes);
   (void)reportBetween(options, scenes);
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);

@@ -167,6 +167,8 @@ void tellGrid(const Options& options, const ConvertedGrid& grid, const cli::Log&
         "grid \"" + grid.uniqueName +
         "\": the signs of inactive voxels inside the surface are lost; --lossless or --keep "
         "keeps them");
+  if (const std::string why = whyImprecise(grid.stored()); !why.empty())
+    log.warning("grid \"" + grid.uniqueName + "\": " + why);
   if (grid.isBoxEmpty)
     log.warning("grid \"" + grid.uniqueName + "\" has no active voxel in the box of --box");
   if (const FitResult& fit = grid.conversion.fit; fit.deviceFull)

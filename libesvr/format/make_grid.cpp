@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -35,6 +38,35 @@ std::string whyNoNarrowBand(const GridDescriptor& descriptor, const SparseVolume
 
 bool isNarrowBand(const GridDescriptor& descriptor, const SparseVolume& source) {
   return whyNoNarrowBand(descriptor, source).empty();
+}
+
+// ---- What float32 can evaluate
+
+std::string whyImprecise(const StoredGrid& grid) {
+  // The error grows with both. It is 2.2e-4 of the largest value where k is 5000, and 1.1e-4 where the sum is 2,487 times
+  // smaller than its terms (docs/figures/stability.md).
+  constexpr double kSharpest = 2000.0, kMostCancelled = 2000.0;
+  double sharpest = grid.field.chunks.empty() ? 0.0 : double(grid.field.kernel.kappa);
+  double largest = 0.0;
+  for (const Chunk& chunk : grid.field.chunks) {
+    for (const float kappa : chunk.ellipsoids.kappa) sharpest = std::max(sharpest, double(kappa));
+    for (const float i : chunk.ellipsoids.intensity)
+      largest = std::max(largest, std::abs(double(i)));
+  }
+  const auto number = [](double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g", value);
+    return std::string(text);
+  };
+  if (sharpest > kSharpest)
+    return "an edge has a sharpness of " + number(sharpest) + ", for which float32 has few digits";
+  double peak = std::abs(double(grid.field.background));
+  for (const float end : {grid.valueMin, grid.valueMax})
+    peak = std::max(peak, std::abs(double(grid.tone.isOn() ? grid.tone.of(end) : end)));
+  if (peak > 0.0 && largest > kMostCancelled * peak)
+    return "its ellipsoids are " + number(largest / peak) +
+           " times as large as its values and cancel each other, for which float32 has few digits";
+  return {};
 }
 
 // ---- The threshold of activity

@@ -21,12 +21,14 @@ NOT_MEASURED = "not measured"
 # Why a case is beyond float32, and where users meet it.
 REASONS = {
     "k = 5000": "its edge lies where m is about 5000, and float32 has an error of m in proportion to m. The default fit keeps "
-                "kappa at 30 or below; only `--method paper` makes sharper ellipsoids, and k = 500 passes.",
+                "kappa at 30 or below; only `--method paper` makes sharper ellipsoids, and k = 500 passes. "
+                "The programs warn of an edge that is sharper than 2000.",
     "denormals": "a GPU takes numbers below 1.2e-38 as 0, so that CUDA draws nothing of a volume whose largest value is below; "
                  "`esvr-render` warns of it. `esvr2vdb` decodes on the CPU and writes such values.",
     "signed data that cancel": "a sum that is 2,487 times smaller than its terms has three digits fewer, in any order. A GPU adds "
                                "in integers, so that the order of threads changes no bit, which costs another unit for each "
-                               "term. Both differences are far below the bound.",
+                               "term. Both differences are far below the bound. The programs warn of ellipsoids that are "
+                               "2000 times as large as the values of their grid.",
 }
 
 def section(title, text):

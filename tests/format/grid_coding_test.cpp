@@ -103,6 +103,24 @@ TEST(GridCoding, FactsOfTheSourceAreStored) {
 
 // The thresholds are edges of bins, which floats represent exactly, so that the source's threshold
 // can be met.
+TEST(GridCoding, SaysWhatFloat32EvaluatesImprecisely) {
+  const Field field = positiveField(3);
+  const StoredGrid usual = makeStoredGrid(kFog, revoxelise(field, {}), field);
+  EXPECT_EQ(whyImprecise(usual), "");
+  StoredGrid sharp = usual, cancelling = usual;
+  sharp.field.kernel.kappa = 5000.0f;
+  EXPECT_EQ(whyImprecise(sharp),
+            "an edge has a sharpness of 5000, for which float32 has few digits");
+  auto& intensity = cancelling.field.chunks[0].ellipsoids.intensity;
+  const double peak = std::max(std::abs(usual.valueMin), std::abs(usual.valueMax));
+  intensity[0] = float(1900.0 * peak), intensity[1] = -intensity[0];
+  EXPECT_EQ(whyImprecise(cancelling), "");
+  intensity[0] = float(4096.0 * peak), intensity[1] = -intensity[0];
+  EXPECT_EQ(whyImprecise(cancelling),
+            "its ellipsoids are 4096 times as large as its values and cancel each other, for which "
+            "float32 has few digits");
+}
+
 TEST(GridCoding, AFieldThatFitsGivesItsSourceBack) {
   for (const float threshold : {0.0f, 0.0625f, 0.5f}) {
     const Field field = positiveField(2);

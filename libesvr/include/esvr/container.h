@@ -104,6 +104,10 @@ struct StoredGrid {
   std::optional<VoxelLayer> nonFiniteVoxels;
 };
 
+/// Why float32 evaluates the sum of a grid's ellipsoids with an error above 1e-4 of its largest value; empty if it does
+/// not. Fits with the default options make no such grid (docs/figures/stability.md).
+[[nodiscard]] std::string whyImprecise(const StoredGrid& grid);
+
 /// Bytes of each stream of a grid's quantised ellipsoids.
 struct StreamBytes {
   std::uint64_t positions = 0, scales = 0, rotations = 0, intensities = 0;
