@@ -306,12 +306,12 @@ bool isQuality(const Goal& goal) {
 }
 
 /// The quality of a goal that is one, dB, as the job measures it.
-double qualityOf(const Job& job) {
+double wantedQuality(const Job& job) {
   if (const auto* psnr = std::get_if<PsnrGoal>(&job.options.goal)) return psnr->psnr;
   if (const auto* pictures = std::get_if<PictureGoal>(&job.options.goal)) return pictures->psnr;
-  const Preset preset = job.options.fit.preset;
-  return seesPictures(job) ? presetPicturePsnr(preset)
-                           : presetPsnr(preset) + boxGain(job.input.source, job.options);
+  const PresetQuality preset = qualityOf(job.options.fit.preset);
+  return seesPictures(job) ? preset.picturePsnr
+                           : preset.psnr + boxGain(job.input.source, job.options);
 }
 
 /// Calls the conversion that belongs to a goal.
@@ -325,7 +325,7 @@ class Converter {
     const double most = double(activeVoxelCount(job_.input.source)) / kTuning.leastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
     const Job job{job_.input, options, job_.judge, job_.scout};
-    return Choice(job, {.psnr = qualityOf(job)})
+    return Choice(job, {.psnr = wantedQuality(job)})
         .forPsnr(kTuning.worthwhileShare, kTuning.smallEnough);
   }
   Conversion operator()(const SizeGoal& goal) const {
@@ -365,7 +365,7 @@ class Converter {
   static constexpr std::uint64_t kSmallForPsnr = 512;
 
   [[nodiscard]] Conversion forPsnr() const {
-    return Choice(job_, {.psnr = qualityOf(job_)}).forPsnr(1.0, kSmallForPsnr);
+    return Choice(job_, {.psnr = wantedQuality(job_)}).forPsnr(1.0, kSmallForPsnr);
   }
 
   [[nodiscard]] Conversion asVoxels(VoxelLayer layer) const {
@@ -391,7 +391,7 @@ Conversion convertToGoal(const Job& job) { return std::visit(Converter(job), job
 std::optional<Conversion> continueFrame(const Job& job) {
   constexpr double kMostFrameGrowth = 1.5;
   const StoredGrid& before = *job.options.previous;
-  const double wanted = qualityOf(job);
+  const double wanted = wantedQuality(job);
   if (isConstant(job.input.source)) return std::nullopt;
   EllipsoidSearch search(job, {.psnr = wanted, .before = &before});
   std::optional<Conversion> made;
@@ -644,7 +644,7 @@ std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptio
   if (!change || isUsualBand(input, options, *change)) return std::nullopt;
   std::optional<double> bound;
   if (std::holds_alternative<PresetGoal>(options.goal)) {
-    bound = presetSurfaceBound(options.fit.preset) * *change;
+    bound = qualityOf(options.fit.preset).surfaceBound * *change;
     options.goal = BoundGoal{*bound};
   }
   options.representation = Representation::kVoxels;
@@ -779,40 +779,16 @@ PaperConversion convertedByPaper(const ConvertInput& input, const PaperFitOption
 
 namespace esvr {
 
-double presetPicturePsnr(Preset preset) {
+PresetQuality qualityOf(Preset preset) {
   switch (preset) {
     case Preset::kDraft:
-      return 30.0;
+      return {.psnr = 32.0, .picturePsnr = 30.0, .surfaceBound = 0.4};
     case Preset::kHigh:
-      return 48.0;
+      return {.psnr = 50.0, .picturePsnr = 48.0, .surfaceBound = 0.025};
     case Preset::kStandard:
       break;
   }
-  return 38.0;
-}
-
-double presetPsnr(Preset preset) {
-  switch (preset) {
-    case Preset::kDraft:
-      return 32.0;
-    case Preset::kHigh:
-      return 50.0;
-    case Preset::kStandard:
-      break;
-  }
-  return 40.0;
-}
-
-double presetSurfaceBound(Preset preset) {
-  switch (preset) {
-    case Preset::kDraft:
-      return 0.4;
-    case Preset::kHigh:
-      return 0.025;
-    case Preset::kStandard:
-      break;
-  }
-  return 0.1;
+  return {.psnr = 40.0, .picturePsnr = 38.0, .surfaceBound = 0.1};
 }
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {

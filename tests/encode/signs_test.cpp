@@ -271,7 +271,7 @@ TEST(Surface, IsKeptBesideMarkersOfAnySize) {
     ASSERT_FALSE(isNarrowBand(levelSet(volume), volume));
     const Conversion made = convertVolume({levelSet(volume), volume}, {.goal = PresetGoal{}});
     ASSERT_TRUE(made.surfaceBound);
-    const double bound = presetSurfaceBound(Preset::kStandard) * *changeAcrossSurface(volume);
+    const double bound = qualityOf(Preset::kStandard).surfaceBound * *changeAcrossSurface(volume);
     EXPECT_EQ(*made.surfaceBound, bound);
     EXPECT_LE(largestDifference(volume, decodeGrid(made.grid)), bound);
     EXPECT_EQ(compareSigns(volume, decodeGrid(made.grid)).voxels, 0u);

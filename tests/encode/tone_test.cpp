@@ -139,8 +139,8 @@ TEST(Tone, OfAPresetLimitsTheErrorOfValuesToo) {
   const SparseVolume volume = smoke();
   const Conversion made = shortlyFitted(volume, {.goal = PresetGoal{}});
   const VolumeMetrics m = compareVolumes(volume, decodeGrid(made.grid), {.transmittance = true});
-  EXPECT_GE(m.transmittance->psnr50, presetPicturePsnr(Preset::kStandard));
-  EXPECT_GE(m.psnrActive, presetPicturePsnr(Preset::kStandard) - 4.0);
+  EXPECT_GE(m.transmittance->psnr50, qualityOf(Preset::kStandard).picturePsnr);
+  EXPECT_GE(m.psnrActive, qualityOf(Preset::kStandard).picturePsnr - 4.0);
 }
 
 TEST(Tone, IsNotUsedWhereItDoesNotServe) {

@@ -32,9 +32,9 @@ struct FitGoal {
   friend auto operator<=>(const FitGoal&, const FitGoal&) = default;
 };
 
-/// The smallest grid found with the quality that FitOptions::preset stands for: presetPicturePsnr() if the
-/// measure is what is seen, presetSurfaceBound() for a level set that is no narrow band (isNarrowBand,
-/// grid_coding.h), and otherwise an error of at most that of presetPsnr() over the active voxels.
+/// The smallest grid found with the quality that FitOptions::preset stands for (PresetQuality): picturePsnr if the
+/// measure is what is seen, surfaceBound for a level set that is no narrow band (isNarrowBand, grid_coding.h), and
+/// otherwise an error of at most that of psnr over the active voxels.
 /// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
 /// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {
@@ -92,13 +92,15 @@ struct LosslessGoal {
 using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, BoundGoal,
                           RelativeBoundGoal, LosslessGoal>;
 
-/// PSNR over the active voxels that a preset stands for, dB, and that of the transmittance.
-[[nodiscard]] double presetPsnr(Preset preset);
-[[nodiscard]] double presetPicturePsnr(Preset preset);
-
-/// The largest error of a value of a level set that a preset stands for, relative to the change of the values by
-/// one voxel across the surface: about the largest distance by which the surface moves, in voxels.
-[[nodiscard]] double presetSurfaceBound(Preset preset);
+/// The quality that a preset stands for.
+struct PresetQuality {
+  double psnr = 0.0;         ///< PSNR over the active voxels, dB
+  double picturePsnr = 0.0;  ///< PSNR of the transmittance, dB
+  /// The largest error of a value of a level set, relative to the change of the values by one voxel across the surface:
+  /// about the largest distance by which the surface moves, in voxels.
+  double surfaceBound = 0.0;
+};
+[[nodiscard]] PresetQuality qualityOf(Preset preset);
 
 /// What the quality of a PresetGoal and of a SizeGoal means.
 enum class Measure {
@@ -106,7 +108,7 @@ enum class Measure {
   /// of its transmittance for T = 0.5, unless the PSNR over the active voxels limits it: it may be 4 dB
   /// lower with a tone curve, and must be 2 dB higher without one. A level set that is no narrow band, or
   /// for a preset one of more than 16 voxels, is judged by its surface, since its values far from it, such as
-  /// markers of empty space, may be of any size: it is stored as voxels, with presetSurfaceBound() for a preset. For any other volume, as kValues.
+  /// markers of empty space, may be of any size: it is stored as voxels, with PresetQuality::surfaceBound for a preset. For any other volume, as kValues.
   kAuto,
   kValues  ///< the PSNR of values
 };
