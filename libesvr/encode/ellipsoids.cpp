@@ -8,7 +8,6 @@
 
 #include "core/parallel.h"
 #include "encode/rate_control.h"
-#include "encode/root_search.h"
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -245,14 +244,8 @@ constexpr std::uint32_t kMostIterationsOfAverages = 1000;
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
 constexpr std::uint64_t kRefillDivisor = 100;
-/// Limits of the loss by rounding for a judge, dB over the box; the octaves by which the steps may then be scaled, and
-/// those that make no difference; the dB by which a rounded grid may exceed a PSNR, and the times that a fit is rounded
-/// for it.
-constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kMostFiner = 3.0,
-                 kNarrowestFiner = 0.02, kPsnrSpare = 0.08;
-constexpr int kMostRoundings = 4;
-/// A judge's PSNR is that of scaled sums, from which that of a reader, who decodes, differs by 1e-7 dB.
-constexpr double kJudgedMargin = 1e-5;
+/// Limits of the loss by rounding for a judge, dB over the box.
+constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
 constexpr double kMostBehind = 2.5;
 /// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
@@ -431,41 +424,27 @@ CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions 
   return compactedTo(job_, attempt.grid, attempt.fit, target);
 }
 
-/// The smallest conversion of an attempt with the PSNR of the goal. Rate control knows the error over the
-/// box alone, by which it finds the proportions of the steps. A judge's PSNR loses about as many dB, which is measured;
-/// where it misses the goal or exceeds it, all steps are scaled.
+/// The smallest conversion of an attempt with the PSNR of the goal. A judge's PSNR loses about as many dB as that over the
+/// box, which rate control knows, and is measured.
 Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
   if (!job_.judge || !compact_)
     return storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
   const double loss =
       std::clamp((attempt.psnr - *goal_.psnr) / rounding_.factor, kLeastLoss, kMostRoundingLoss);
-  std::optional<Compactor> compactor;
-  const auto rounded = [&](const QuantiserSteps* steps) {
-    return roundedBy(job_, attempt.grid, attempt.fit, {.loss = loss},
-                     [&](const CompactOptions& options) {
-                       if (!compactor) compactor.emplace(attempt.grid, job_.input.source, options);
-                       return steps ? compactor->at(*steps) : compactor->toGoal();
-                     });
-  };
-  CompactResult made = rounded(nullptr);
-  const QuantiserSteps steps = made.steps;
-  // The loss, dB, falls by a factor of 4 for an octave.
-  RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, *goal_.psnr + 0.5 * kPsnrSpare,
-                    std::log(4.0) * rounding_.factor * loss, 0.0);
-  std::optional<CompactResult> best;
-  for (int trial = 1;; ++trial) {
-    const double psnr = completed(attempt, made), over = psnr - *goal_.psnr - kJudgedMargin;
-    const double bestOver = best ? *reached_ - *goal_.psnr - kJudgedMargin : -HUGE_VAL;
-    const bool isBetter = bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver;
-    if (isBetter) best = std::move(made), reached_ = psnr;
-    if ((over >= 0.0 && over <= kPsnrSpare) || attempt.cancelled() || isCancelled(job_)) break;
-    search.learn(psnr);
-    if (trial == kMostRoundings || search.ended()) break;
-    const QuantiserSteps next = finer(steps, search.next());
-    made = rounded(&next);
-  }
+  reached_.reset();
+  CompactResult made = roundedBy(
+      job_, attempt.grid, attempt.fit, {.loss = loss}, [&](const CompactOptions& options) {
+        Compactor compactor(attempt.grid, job_.input.source, options);
+        auto found =
+            compactor.toQuality({*goal_.psnr, rounding_.factor * loss, [&](CompactResult& rounded) {
+                                   return completed(attempt, rounded);
+                                 }});
+        reached_ = found.quality;
+        return std::move(found.result);
+      });
+  if (!reached_) reached_ = completed(attempt, made);
   if (*reached_ < *goal_.psnr && !attempt.cancelled()) attempt.fit.end = FitEnd::kPsnrMissed;
-  return conversionOf(std::move(attempt.fit), std::move(*best));
+  return conversionOf(std::move(attempt.fit), std::move(made));
 }
 
 /// The quality that an attempt has after rounding. A grid that is seen gets the mass of its source.

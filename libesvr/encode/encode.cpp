@@ -16,6 +16,7 @@
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
 #include "encode/non_finite.h"
+#include "encode/rate_control.h"
 #include "encode/signs.h"
 #include "encode/tone.h"
 #include "encode/tuning.h"
@@ -656,18 +657,19 @@ std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptio
   return std::nullopt;
 }
 
-/// Converts a volume that is judged by pictures, or by the values of its tones.
-/// \param convert  makes a grid of the tones; convertToGoal() or continueFrame()
+/// Converts a volume, or its tones if there is a curve.
+/// \param convert  makes a grid for a job: convertToGoal() or continueFrame()
 template <class Convert>
-std::optional<Conversion> convertJudged(const ConvertInput& given, ConvertOptions options,
-                                        const ToneChoice& choice, const Convert& convert) {
+std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput& given,
+                                    ConvertOptions options, const Convert& convert) {
   const ToneCurve tone = choice.tone;
-  const Judge judge(given, options, tone);
+  const StoredGrid* const previous = options.previous;
+  std::optional<Judge> judge;
+  if (tone.isOn() || Judge::seesPictures(given, options)) judge.emplace(given, options, tone);
+  if (judge && previous && !(previous->tone == tone)) options.previous = nullptr;
   GridDescriptor descriptor = given.descriptor;
   SparseVolume tones;
   StoredGrid before;  // the previous frame, as a grid of tones
-  const StoredGrid* const previous = options.previous;
-  if (previous && !(previous->tone == tone)) options.previous = nullptr;
   if (tone.isOn()) {
     tones = tonesOf(given.source, tone);
     descriptor.valueType = ValueType::kFloat;
@@ -681,32 +683,20 @@ std::optional<Conversion> convertJudged(const ConvertInput& given, ConvertOption
       size->bytes -= std::min<std::uint64_t>(size->bytes, sizeof tone.scale);
   }
   const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
-  const Job job{input, options, &judge, choice.scout};
-  std::optional<Conversion> made = convert(job);
-  if (!made) return std::nullopt;
-  made->smallerExactBytes = unlessCancelled([&] { return smallerExactBytes(job, made->grid); });
-  if (tone.isOn()) setTone(given, tone, made->grid);
-  if (made->fit.end != FitEnd::kCancelled)
-    measureLayers(given, made->grid);
-  else
-    made->grid.layerErrors.clear();
-  made->byPictures = judge.seesPictures();
-  made->grid = throughTheFormat(std::move(made->grid), previous, memoryOf(given.source));
-  return made;
-}
-
-/// Converts a volume with a tone curve or none. \param convert  as in convertJudged()
-template <class Convert>
-std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput& input,
-                                    const ConvertOptions& options, const Convert& convert) {
-  if (choice.tone.isOn() || Judge::seesPictures(input, options))
-    return convertJudged(input, options, choice, convert);
-  const Job job{input, options};
+  const Job job{input, options, judge ? &*judge : nullptr, choice.scout};
   std::optional<Conversion> made =
       options.fit.narrowBand ? convertNarrowBand(job, convertToGoal) : convert(job);
   if (!made) return std::nullopt;
   made->smallerExactBytes = unlessCancelled([&] { return smallerExactBytes(job, made->grid); });
-  made->grid = throughTheFormat(std::move(made->grid), options.previous, memoryOf(input.source));
+  if (tone.isOn()) setTone(given, tone, made->grid);
+  if (judge) {
+    const BestSoFar completion;  // a grid that is there is not given up
+    made->grid.layerErrors = made->fit.end == FitEnd::kCancelled
+                                 ? std::vector<LayerError>{}
+                                 : layerErrorsOf(made->grid, given.source, judge->comparison());
+  }
+  made->byPictures = seesPictures(job);
+  made->grid = throughTheFormat(std::move(made->grid), previous, memoryOf(given.source));
   requirePromises(job, made->grid);
   return made;
 }

@@ -1,10 +1,11 @@
 #pragma once
 /// Rate control of ellipsoids: the steps of the four parameter streams with which a fitted grid takes the fewest bytes for
-/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid() (esvr/encode.h). A
-/// search that judges several results of one grid uses Compactor.
+/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid() (esvr/encode.h),
+/// or Compactor where a judge measures the results.
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "esvr/container.h"
 #include "esvr/device.h"
 #include "esvr/encode.h"
+#include "esvr/metrics.h"
 #include "esvr/quantised.h"
 #include "esvr/volume.h"
 #include "fit/intensity_problem.h"
@@ -93,11 +95,27 @@ class RateTrials {
   double peak_, error_ = 0.0, leastError_ = 0.0;
 };
 
+/// The errors of the first layers of a grid, by decoding them; empty unless it has several.
+[[nodiscard]] std::vector<LayerError> layerErrorsOf(const StoredGrid& grid,
+                                                    const SparseVolume& source,
+                                                    const CompareOptions& options);
+
 /// Steps that are finer by a number of octaves.
 [[nodiscard]] QuantiserSteps finer(QuantiserSteps steps, double octaves);
 
-/// Compacts one grid several times, for a search that judges each result. compactGrid() does it once. Between the results,
-/// the trials and their memory stay.
+/// A quality that the trials of rate control do not know.
+struct JudgedGoal {
+  double quality = 0.0;  ///< dB
+  double loss =
+      1.0;  ///< about the dB that are lost by rounding, a quarter of which steps of half the size lose
+  std::function<double(CompactResult&)> judge;  ///< the quality of a result, which it may change
+};
+struct JudgedResult {
+  CompactResult result;
+  double quality = 0.0;
+};
+
+/// Compacts one grid several times. compactGrid() does it once. Between the results, the trials and their memory stay.
 class Compactor {
  public:
   /// The grid and the source must outlive the object. \throws DeviceError  the GPU cannot be used
@@ -107,6 +125,11 @@ class Compactor {
   [[nodiscard]] CompactResult toGoal();
   /// The result with given steps, whatever the goal is.
   [[nodiscard]] CompactResult at(const QuantiserSteps& steps);
+  /// The smallest result whose PSNR is that of the options for a reader, who has a mask.
+  [[nodiscard]] CompactResult toPsnrOfReader();
+  /// The smallest result with a judged quality. It begins with toGoal(), which finds the proportions of the steps, and
+  /// scales all of them. \return the best one if none reaches the quality, or the call is cancelled meanwhile
+  [[nodiscard]] JudgedResult toQuality(const JudgedGoal& goal);
 
  private:
   [[nodiscard]] CompactResult resultOf(RateTrial trial);

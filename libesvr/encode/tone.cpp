@@ -297,18 +297,6 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
   if (grid.activeThreshold > 0.0f) grid.activeThreshold = tone.value(grid.activeThreshold);
 }
 
-void measureLayers(const ConvertInput& input, StoredGrid& grid) {
-  const BestSoFar completion;  // a grid that is there is not given up
-  std::vector<LayerError> errors;
-  const std::size_t all = layerCount(grid);
-  for (std::size_t layers = 1; layers <= all && all > 1; ++layers) {
-    const VolumeMetrics m = compareVolumes(
-        input.source, decodeGrid(firstLayers(grid, layers), {.memory = memoryOf(input.source)}));
-    errors.push_back({float(m.psnrBox), float(m.maxError)});
-  }
-  grid.layerErrors = std::move(errors);
-}
-
 // ---- A bound relative to each value
 
 namespace {

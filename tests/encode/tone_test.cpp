@@ -284,6 +284,24 @@ TEST(Tone, OfAGivenScaleServesSignedValues) {
   EXPECT_GE(compareVolumes(volume, decodeGrid(made.grid)).psnrBox, 35.0);
 }
 
+TEST(Tone, LayersHaveTheErrorsOfTheBoxOfTheConversion) {
+  const SparseVolume volume = smoke();
+  ConvertOptions options{.goal = FitGoal{}, .tone = ToneCurve{0.3f}};
+  options.fit.box = Box{{8, 8, 8}, {23, 23, 23}};
+  options.fit.count = 3000;
+  options.representation = Representation::kEllipsoids;
+  options.fit.iterations = 5;
+  const StoredGrid grid = convertVolume({fog(), volume}, options).grid;
+  ASSERT_GE(layerCount(grid), 2u);
+  ASSERT_EQ(grid.layerErrors.size(), layerCount(grid));
+  for (std::size_t k = 1; k <= layerCount(grid); ++k) {
+    const auto metrics =
+        compareVolumes(volume, decodeGrid(firstLayers(grid, k)), {.box = options.fit.box});
+    EXPECT_EQ(grid.layerErrors[k - 1].psnrBox, float(metrics.psnrBox));
+    EXPECT_EQ(grid.layerErrors[k - 1].maxError, float(metrics.maxError));
+  }
+}
+
 TEST(Tone, ComesBackFromAFile) {
   const SparseVolume volume = smoke();
   for (const auto representation : {Representation::kEllipsoids, Representation::kVoxels}) {
