@@ -56,21 +56,22 @@ bool GridConverter::isCancelled() const {
   return token && token->cancelled();
 }
 
-void GridConverter::step(std::size_t g, const std::function<void()>& run) {
-  fit_.progress = options_.convert.fit.progress;  // that of another step may be gone
-  step({g, true, fit_, run});
-}
-
-void GridConverter::step(const GridStep& step) const {
+void GridConverter::step(std::size_t g, bool isAlone,
+                         const std::function<void(const FitOptions&)>& run) {
+  FitOptions own = fit_;
+  FitOptions& fit = isAlone ? fit_ : own;
+  fit.progress = options_.convert.fit.progress;  // that of another step may be gone
+  const std::function<void()> withOptions = [&] { run(fit); };
   if (options_.onStep)
-    options_.onStep(step);
+    options_.onStep({g, isAlone, fit, withOptions});
   else
-    step.run();
+    withOptions();
 }
 
 void GridConverter::findScales() {
   for (std::size_t g = 0; g < grids_.size(); ++g)
-    if (grids_[g].component == std::size_t{0}) step(g, [&] { findScale(g); });
+    if (grids_[g].component == std::size_t{0})
+      step(g, true, [&](const FitOptions&) { findScale(g); });
 }
 
 void GridConverter::findScale(std::size_t g) {
@@ -140,24 +141,16 @@ bool GridConverter::isAsBefore(const StoredGrid* previous, const VolumeGrid& sou
          previous->descriptor.valueType == source.descriptor.valueType;
 }
 
-GridConversion GridConverter::make(std::size_t g, const Wish& wish) {
+GridConversion GridConverter::make(std::size_t g, const Wish& wish, bool isAlone) {
   GridConversion made;
-  step(g, [&] { made = readAndConvert(g, wish, fit_); });
+  step(g, isAlone, [&](const FitOptions& fit) {
+    double secondsRead = 0.0, secondsConvert = 0.0;
+    const VolumeGrid source = addSeconds(secondsRead, [&] { return read(g); });
+    made = addSeconds(secondsConvert, [&] { return convert(g, source, wish, fit); });
+    made.secondsRead = secondsRead, made.secondsConvert = secondsConvert;
+    if (options_.onConverted) options_.onConverted(source, made);
+  });
   return made;
-}
-
-GridConversion GridConverter::makeBeside(std::size_t g) const {
-  GridConversion made;
-  stepBeside(g, [&](const FitOptions& fit) { made = readAndConvert(g, {}, fit); });
-  return made;
-}
-
-void GridConverter::stepBeside(std::size_t g,
-                               const std::function<void(const FitOptions&)>& run) const {
-  FitOptions fit = fit_;
-  fit.progress = options_.convert.fit.progress;
-  const std::function<void()> withOptions = [&] { run(fit); };
-  step({g, false, fit, withOptions});
 }
 
 std::size_t GridConverter::mostAtOnce() const {
@@ -168,55 +161,38 @@ std::size_t GridConverter::mostAtOnce() const {
   return options_.severalAtOnce ? std::min(kAtOnce, threads) : 1;
 }
 
-Conversion GridConverter::convertLike(std::size_t g, const VolumeGrid& source,
-                                      const StoredGrid& expected, const FitOptions& fit) const {
-  GridConversion made;
-  ConvertOptions options = options_.convert;
-  options.keepsPastErrors = false;  // those of another grid are not worth keeping
-  options.fit = fit;
-  convert(g, source, {.expected = &expected}, std::move(options), made);
-  return std::move(made.conversion);
-}
-
-GridConversion GridConverter::readAndConvert(std::size_t g, const Wish& wish,
-                                             const FitOptions& fit) const {
-  GridConversion made{.source = g, .convertedAs = g};
-  const VolumeGrid source = addSeconds(made.secondsRead, [&] { return read(g); });
+GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
+                                      const FitOptions& fit) const {
+  GridConversion made{.source = g, .convertedAs = g, .key = keyOf(g, source)};
   made.bricks = source.volume.brickCount();
   made.nonFiniteReplaced = source.nonFiniteReplaced;
   made.inactive = source.inactive;
-  made.key = keyOf(g, source);
-  addSeconds(made.secondsConvert, [&] {
-    ConvertOptions options = options_.convert;
-    options.fit = fit;
-    convert(g, source, wish, std::move(options), made);
-  });
-  if (options_.onConverted) options_.onConverted(source, made);
-  return made;
-}
-
-void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
-                            ConvertOptions options, GridConversion& made) const {
-  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
-  if (scales_[g].peak) options.fit.peak = scales_[g].peak;
-  if (grids_[g].component) options.measure = Measure::kValues;
-  // With a size, every grid uses its own bytes for its values.
-  if (!wish.bytes && needsExactSet(g, source)) options.storage.activity = Activity::kExact;
   const StoredGrid* const previous = previousOf(g);
-  options.previous = wish.expected ? wish.expected : previous;
   if (!wish.expected && isAsBefore(previous, source, made.key)) {
     made.asBefore = true;
     made.conversion.grid = *previous;
     made.conversion.grid.descriptor = source.descriptor;
     made.conversion.grid.reference.reset();  // it may name another grid of this file
-  } else if (options_.paper) {
-    PaperConversion byPaper = convertByPaper({source.descriptor, source.volume},
-                                             {options.fit, *options_.paper}, options.storage);
-    made.conversion = std::move(byPaper.conversion);
-    made.paper = std::move(byPaper.record);
-  } else {
-    made.conversion = convertVolume({source.descriptor, source.volume}, options);
+    return made;
   }
+  ConvertOptions options = options_.convert;
+  options.fit = fit;
+  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
+  options.previous = wish.expected ? wish.expected : previous;
+  if (wish.expected) options.keepsPastErrors = false;  // those of another grid are not worth it
+  if (scales_[g].peak) options.fit.peak = scales_[g].peak;
+  if (grids_[g].component) options.measure = Measure::kValues;
+  // With a size, every grid uses its own bytes for its values.
+  if (!wish.bytes && needsExactSet(g, source)) options.storage.activity = Activity::kExact;
+  const ConvertInput input{source.descriptor, source.volume};
+  if (!options_.paper) {
+    made.conversion = convertVolume(input, options);
+    return made;
+  }
+  PaperConversion byPaper = convertByPaper(input, {options.fit, *options_.paper}, options.storage);
+  made.conversion = std::move(byPaper.conversion);
+  made.paper = std::move(byPaper.record);
+  return made;
 }
 
 }  // namespace encode
@@ -256,7 +232,8 @@ Twins findTwins(const std::vector<GridSource>& grids, GridConverter& converter) 
   for (std::size_t g = 0; g < grids.size() && !converter.isCancelled(); ++g) {
     if (!mayHaveTwin(grids, grids[g])) continue;
     VolumeGrid grid;
-    const double seconds = secondsOf([&] { converter.step(g, [&] { grid = converter.read(g); }); });
+    const double seconds = secondsOf(
+        [&] { converter.step(g, true, [&](const FitOptions&) { grid = converter.read(g); }); });
     const SourceKey key = converter.keyOf(g, grid);
     const auto [first, isNew] = firstBy.emplace(key, g);
     if (!isNew)
@@ -501,7 +478,7 @@ class GridsConversion {
       if (!twins_.contains(g) && source_.grids[g].activeVoxels <= kMostActive) small.push_back(g);
     encode::forEachAtOnce(small.size(), converter_.mostAtOnce(), [&](std::size_t i) {
       try {
-        made_[small[i]] = converter_.makeBeside(small[i]);
+        made_[small[i]] = converter_.make(small[i], {}, false);
       } catch (const DeviceError&) {  // it is converted again where another device can take over
       } catch (const Cancelled&) {
       }
@@ -559,7 +536,7 @@ class GridsConversion {
     if (takeEarlier(g, shares)) return;
     std::optional<std::uint64_t> bytes = shares.of(g);
     if (bytes) *bytes += shares.saved();
-    GridConversion grid = converter_.make(g, {.bytes = bytes});
+    GridConversion grid = converter_.make(g, {.bytes = bytes}, true);
     const auto excessOf = [&]() -> std::uint64_t {
       const BestSoFar completion;
       // No grid follows an interrupted one.
@@ -569,7 +546,7 @@ class GridsConversion {
     };
     while (const std::uint64_t excess = excessOf()) {
       bytes = less(*bytes, excess);
-      grid = converter_.make(g, {.bytes = bytes});
+      grid = converter_.make(g, {.bytes = bytes}, true);
     }
     made_[g] = std::move(grid);
   } catch (const Cancelled&) {  // before it had a result

@@ -287,10 +287,11 @@ double psnrFor(const std::vector<FitPoint>& fits, double count, double slope) {
 
 }  // namespace
 
-EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
+EllipsoidSearch::EllipsoidSearch(const Job& job, const Aim& goal, const StoredGrid* before)
     : options_(job.options),
       job_{job.input, options_, job.judge, job.scout},
       goal_(goal),
+      before_(before),
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
       saturates_(saturates(job.input.source)),
@@ -300,11 +301,10 @@ EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
-  if (goal.below) stayBelow(*goal.below);
 }
 
 void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
-  goal_.below = bytes;
+  below_ = bytes;
   maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kTuning.leastBytesEach) + 1);
 }
 
@@ -460,7 +460,7 @@ double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded
 
 /// Quality of a whole fit less that of a short one, dB.
 double EllipsoidSearch::behind() const {
-  if (goal_.before) return 0.0;
+  if (before_) return 0.0;
   const double whole = plan_.wholeIterations, brief = plan_.shortIterations;
   if (!isToned(job_)) {
     const double usual = saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind;
@@ -519,7 +519,7 @@ double EllipsoidSearch::firstCountForPsnr() const {
   }
   const double guess = firstCount(job_);
   // Where ellipsoids win, they usually take about half of the bytes.
-  return goal_.below ? std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach) : guess;
+  return below_ ? std::min(guess, 0.5 * double(*below_) / kTuning.usualBytesEach) : guess;
 }
 
 // Large ellipsoids are fitted to averages, whose iterations take a seventh of the time. Iterations of all voxels after
@@ -595,13 +595,13 @@ void EllipsoidSearch::draftNearPsnr() {
       return;
     }
     if (drafts == kMostDrafts) return;
-    isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
+    isTooLarge_ = !mayStayBelow(below_.value_or(UINT64_MAX));
     if (draft_->cancelled() || isTooLarge_) return;
     if (!slopeIsKnown_ && !isToned(job_) && next() > kFar * countOf(*draft_)) {
       const auto fewer = another(countOf(*draft_) / kFar);
       if (!fewer) return;
       learnFrom(*fewer);
-      isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
+      isTooLarge_ = !mayStayBelow(below_.value_or(UINT64_MAX));
       if (isTooLarge_) return;
     }
     const double count = next(), ratio = count / countOf(*draft_);
@@ -616,7 +616,7 @@ void EllipsoidSearch::draftNearPsnr() {
 /// A fit that continues the ellipsoids of the frame before takes the place of the short ones, and is the first whole one.
 /// It has a few less, so that their number falls where fewer will do.
 void EllipsoidSearch::continueFrame() {
-  const StoredGrid& before = *goal_.before;
+  const StoredGrid& before = *before_;
   const auto hasNegative = [](const Chunk& chunk) {
     return std::ranges::any_of(chunk.ellipsoids.intensity, [](float i) { return i < 0.0f; });
   };
@@ -686,13 +686,13 @@ void EllipsoidSearch::forecast() {
 void EllipsoidSearch::draft(const CancelToken* cancel) {
   const CancelToken* own = options_.fit.cancel;
   if (cancel) options_.fit.cancel = cancel;
-  if (goal_.before)
+  if (before_)
     continueFrame();
   else if (goal_.psnr)
     draftNearPsnr();
   else
     draft_ = shortFit(firstCount(job_));
-  if (!goal_.before && (!goal_.below || mayStayBelow(*goal_.below))) decideSigns();
+  if (!before_ && (!below_ || mayStayBelow(*below_))) decideSigns();
   forecast();
   options_.fit.cancel = own;
 }

@@ -60,22 +60,13 @@ struct Margin {
 /// of the frame before instead of making short fits.
 class EllipsoidSearch {
  public:
-  struct Goal {
-    std::optional<double> psnr{};  ///< dB over the box
-    std::optional<std::uint64_t>
-        bytes{};  ///< bytes that the grid may add to a file, without a PSNR
-    /// Bytes that the grid must stay below to be of use, with a PSNR. Fits end early where the grid
-    /// would not.
-    std::optional<std::uint64_t> below{};
-    const StoredGrid* before =
-        nullptr;  ///< the ellipsoids to continue, with a PSNR; null: there are none
-  };
-
-  EllipsoidSearch(const Job& job, const Goal& goal);
+  /// \param before  the ellipsoids to continue, with a PSNR; null: there are none
+  EllipsoidSearch(const Job& job, const Aim& goal, const StoredGrid* before = nullptr);
   EllipsoidSearch(const EllipsoidSearch&) = delete;
   EllipsoidSearch& operator=(const EllipsoidSearch&) = delete;
 
-  /// Sets Goal::below, before the short fits or after them.
+  /// Sets the bytes that a grid with a PSNR must stay below to be of use, before the short fits or after them. Fits end
+  /// early where it would not.
   void stayBelow(std::uint64_t bytes);
 
   /// Makes the short fits. \param cancel  cancels them alone; null: the job's token does
@@ -139,14 +130,16 @@ class EllipsoidSearch {
   ConvertOptions options_;
   SparseVolume averages_;
   Job job_;
-  Goal goal_;
+  Aim goal_;
+  const StoredGrid* before_;
+  std::optional<std::uint64_t> below_;  ///< stayBelow()
   Plan plan_;
   bool compact_, saturates_;
   Rounding rounding_;
   Margin margin_;
   double slope_;               ///< growth of the quality by twice the ellipsoids, dB
   bool slopeIsKnown_ = false;  ///< from two short fits
-  bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below Goal::below
+  bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below `below_`
   std::uint64_t maxCount_;
   std::optional<Attempt> draft_;           ///< the last short fit
   std::vector<FitPoint> drafted_;          ///< all of them that are like it

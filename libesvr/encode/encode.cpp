@@ -56,7 +56,7 @@ bool isConstant(const SparseVolume& volume) {
 /// Completes the ellipsoids or the voxels for a goal that both can reach, whichever are better.
 class Choice {
  public:
-  Choice(const Job& job, const VoxelSearch::Goal& goal)
+  Choice(const Job& job, const Aim& goal)
       : job_(job), wanted_(representationOf(job)), goal_(goal), plan_(planOf(job)) {}
 
   /// \param share        share of the voxels' bytes that ellipsoids must be expected to stay below
@@ -67,7 +67,7 @@ class Choice {
       return asConversion(exactVoxels(job_), {}, FitEnd::kPsnrReached);
     voxels_.emplace(job_, goal_);
     if (wanted_ == Representation::kVoxels || !plan_.fitsInTime) return completeVoxels();
-    ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.psnr = goal_.psnr});
+    ellipsoids_.emplace(job_, goal_);
     const auto expected = estimateAndDraft(share, smallEnough);
     if (isCancelled(job_)) return bestSoFar();
     if (!ellipsoids_->drafted()) return completeVoxels();
@@ -94,7 +94,7 @@ class Choice {
     voxels_.emplace(job_, goal_);
     if (wanted_ == Representation::kVoxels || exactFits()) return completeVoxels();
     if (!plan_.fitsInTime && voxels_->estimate()) return completeVoxels();
-    ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.bytes = goal_.bytes});
+    ellipsoids_.emplace(job_, goal_);
     seconds_ += secondsOf([&] { ellipsoids_->draft(); });
     figures_ = Candidate{*goal_.bytes, ellipsoids_->expectedPsnr(), true, seconds_};
     std::optional<Candidate> expected;
@@ -151,7 +151,7 @@ class Choice {
   }
 
   Conversion ellipsoidsAlone() {
-    ellipsoids_.emplace(job_, EllipsoidSearch::Goal{.psnr = goal_.psnr, .bytes = goal_.bytes});
+    ellipsoids_.emplace(job_, goal_);
     ellipsoids_->draft();
     auto made = ellipsoids_->run();
     if (!made) throw tooSmall(ellipsoids_->needed());
@@ -237,7 +237,7 @@ class Choice {
 
   const Job& job_;
   Representation wanted_;
-  VoxelSearch::Goal goal_;
+  Aim goal_;
   Plan plan_;
   double seconds_ = 0.0;  ///< wall-clock seconds that all fits took together
   std::optional<VoxelSearch> voxels_;
@@ -394,7 +394,7 @@ std::optional<Conversion> continueFrame(const Job& job) {
   const StoredGrid& before = *job.options.previous;
   const double wanted = wantedQuality(job);
   if (isConstant(job.input.source)) return std::nullopt;
-  EllipsoidSearch search(job, {.psnr = wanted, .before = &before});
+  EllipsoidSearch search(job, {.psnr = wanted}, &before);
   std::optional<Conversion> made;
   const double seconds = secondsOf([&] {
     search.draft();

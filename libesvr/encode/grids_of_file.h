@@ -30,8 +30,8 @@ class GridConverter {
 
   [[nodiscard]] bool isCancelled() const;
 
-  /// Runs a step of a conversion that is alone.
-  void step(std::size_t g, const std::function<void()>& run);
+  /// Runs a step of a conversion. \param isAlone  false: it is one of several at the same time, with options of its own
+  void step(std::size_t g, bool isAlone, const std::function<void(const FitOptions&)>& run);
 
   /// Reads vectors for the peak and the range of their components, and for their active voxels.
   void findScales();
@@ -43,15 +43,11 @@ class GridConverter {
   /// name; null if there is none.
   [[nodiscard]] const StoredGrid* previousOf(std::size_t g) const;
 
-  /// \throws Cancelled  the conversion has no result
-  [[nodiscard]] GridConversion make(std::size_t g, const Wish& wish);
-  /// The same on one of several threads, with options of its own.
-  [[nodiscard]] GridConversion makeBeside(std::size_t g) const;
-  /// The grid that is made from `source` for another grid that it is expected to be like.
-  [[nodiscard]] Conversion convertLike(std::size_t g, const VolumeGrid& source,
-                                       const StoredGrid& expected, const FitOptions& fit) const;
-  /// Runs a step on one of several threads, with options of its own.
-  void stepBeside(std::size_t g, const std::function<void(const FitOptions&)>& run) const;
+  /// Reads a grid and converts it in a step. \throws Cancelled  the conversion has no result
+  [[nodiscard]] GridConversion make(std::size_t g, const Wish& wish, bool isAlone);
+  /// Converts a grid within a step.
+  [[nodiscard]] GridConversion convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
+                                       const FitOptions& fit) const;
   /// Number of small grids that are worked on at the same time.
   [[nodiscard]] std::size_t mostAtOnce() const;
 
@@ -68,13 +64,8 @@ class GridConverter {
     friend bool operator==(const ActiveSet&, const ActiveSet&) = default;
   };
 
-  void step(const GridStep& step) const;
   void findScale(std::size_t g);
   [[nodiscard]] Goal resolvedGoal(std::size_t g) const;
-  [[nodiscard]] GridConversion readAndConvert(std::size_t g, const Wish& wish,
-                                              const FitOptions& fit) const;
-  void convert(std::size_t g, const VolumeGrid& source, const Wish& wish, ConvertOptions options,
-               GridConversion& made) const;
   [[nodiscard]] bool needsExactSet(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] bool isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
                                 const SourceKey& key) const;

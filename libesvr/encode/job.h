@@ -13,6 +13,12 @@ namespace esvr::encode {
 
 class Judge;
 
+/// What a search is to reach: a quality in few bytes, or a size with a good quality.
+struct Aim {
+  std::optional<double> psnr{};          ///< dB, as the job measures it
+  std::optional<std::uint64_t> bytes{};  ///< that the grid may add to a file, without a PSNR
+};
+
 /// The quality, dB, of a fit for which a number of ellipsoids was wanted.
 struct FitPoint {
   double count = 0.0, psnr = 0.0;

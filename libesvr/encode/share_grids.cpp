@@ -130,9 +130,10 @@ class Sharing {
   /// Chooses voxels that take few bytes with a reference, and takes them if they do.
   void chooseAgain(std::size_t g, const VoxelReference& reference, Shared& shared) {
     const StoredGrid expected = expectedFrom(file_.grids, g, reference);
-    converter_.stepBeside(grids_[g].source, [&](const FitOptions& fit) {
+    converter_.step(grids_[g].source, false, [&](const FitOptions& fit) {
       const VolumeGrid source = converter_.read(grids_[g].source);
-      StoredGrid again = converter_.convertLike(grids_[g].source, source, expected, fit).grid;
+      StoredGrid again = converter_.convert(grids_[g].source, source, {.expected = &expected}, fit)
+                             .conversion.grid;
       if (!again.voxels) return;
       const StoredGrid before = std::exchange(file_.grids[g], std::move(again));
       file_.grids[g].reference = reference;

@@ -221,12 +221,13 @@ std::optional<VoxelCandidate> smallerExactVoxels(const Job& job, const StoredGri
 
 // ---- Settings
 
-VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
+VoxelSearch::VoxelSearch(const Job& job, const Aim& goal, std::size_t sampleBricks)
     : job_(job),
       goal_(goal),
+      sampleBricks_(sampleBricks),
       box_(job.options.fit.box.value_or(activeBox(job.input.source))),
       peak_(job.options.fit.peak ? *job.options.fit.peak : peakOf(job.input.source)),
-      sample_(sampleFor(job, job.input.source, goal.sampleBricks)),
+      sample_(sampleFor(job, job.input.source, sampleBricks)),
       tryOn_(sample_.brickCount() > 0 ? sample_ : job.input.source),
       share_(double(tryOn_.brickCount()) / double(job.input.source.brickCount())),
       range_(spanOf(job.input.source).length()),
@@ -326,18 +327,20 @@ std::optional<VoxelSearch::Tried> VoxelSearch::coarsest(const SparseVolume& volu
 
 // ---- A PSNR
 
-/// The smallest voxels found whose lattice has the value of the plateau. The PSNR grows with the logarithm of the number
-/// of its levels, though it need not be monotone where there are other plateaus.
-std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr,
-                                                            const Setting& first) const {
+/// The smallest voxels found whose lattice has the value of the plateau and that reach the PSNR. It grows with the
+/// logarithm of the number of levels, though it need not be monotone where there are other plateaus.
+std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(const SparseVolume& volume,
+                                                            const Setting& first, int mostTrials,
+                                                            double tolerance) const {
+  const double psnr = *goal_.psnr;
   std::optional<Tried> best;
-  double tooFew = 0.0, enough = HUGE_VAL;
-  double levels = std::max(std::round(0.5 * plateau_.value / boundOf(first)), 1.0);
-  for (int n = 0; n < kNearestTrials && enough - tooFew > 1.0; ++n) {
-    Tried now = tried(tryOn_, {.levels = levels});
-    const double wanted = levels * std::exp2((psnr - now.psnr) / kDbPerOctave);
-    (now.psnr >= psnr ? enough : tooFew) = levels;
-    if (now.psnr >= psnr) best = std::move(now);
+  double tooFew = 0.0, enough = HUGE_VAL, levels = first.levels;
+  for (int n = 0; n < mostTrials && enough - tooFew > 1.0; ++n) {
+    Tried now = tried(volume, {.price = first.price, .levels = levels});
+    const double over = now.psnr - psnr, wanted = levels * std::exp2(-over / kDbPerOctave);
+    (over >= 0.0 ? enough : tooFew) = levels;
+    if (over >= 0.0) best = std::move(now);
+    if (over >= 0.0 && over <= tolerance) break;
     levels = std::clamp(std::isfinite(wanted) ? std::ceil(wanted) : tooFew + 1.0, tooFew + 1.0,
                         std::max(enough - 1.0, tooFew + 1.0));
   }
@@ -345,12 +348,16 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr,
   const bool isNear = best && best->psnr < psnr + kDbPerOctave;
   for (const double price : kPlateauPrices) {
     if (!isNear) break;
-    Tried trial = tried(tryOn_, {.price = price, .levels = enough});
+    if (price <= first.price) continue;
+    Tried trial = tried(volume, {.price = price, .levels = enough});
     if (trial.psnr < psnr) break;
     best = std::move(trial);
   }
-  if (best) best->bytes = bytesOf(tryOn_, best->layer, boundOf(best->setting));
   return best;
+}
+
+double VoxelSearch::levelsOf(const Setting& setting) const {
+  return std::max(std::round(0.5 * plateau_.value / boundOf(setting)), 1.0);
 }
 
 /// The coarsest thrifty voxels that reach a PSNR.
@@ -367,8 +374,8 @@ void VoxelSearch::tryForPsnr() {
   const Setting first{psnr / kDbPerOctave - 1.0};
   std::optional<Tried> with;
   if (hasPlateau() && !job_.options.previous && range_ > 0.0) {
-    with = fewestLevels(psnr, first);
-    plateauChoice_.tried = true;
+    with = fewestLevels(tryOn_, {.levels = levelsOf(first)}, kNearestTrials, 0.0);
+    if (with) with->bytes = bytesOf(tryOn_, with->layer, boundOf(with->setting));
   }
   const bool isFine = with && with->setting.levels >= kFineLevels;
   if (!isFine && range_ > 0.0)
@@ -377,7 +384,7 @@ void VoxelSearch::tryForPsnr() {
     if (auto cheaper = thriftyForPsnr(*best_)) best_ = std::move(cheaper);
     best_->bytes = bytesOf(tryOn_, best_->layer, boundOf(best_->setting));
   }
-  decidePlateau(std::move(with));
+  considerPlateau(std::move(with));
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
   if (!exact_ && bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
@@ -399,16 +406,12 @@ bool VoxelSearch::exactIsBest() {
          std::max(kTuning.exactFactor * least, least + double(kTuning.exactBytes));
 }
 
-/// Takes the lattice with the plateau where it is better.
-void VoxelSearch::decidePlateau(std::optional<Tried> with) {
-  if (!plateauChoice_.tried) return;
-  if (best_) plateauChoice_.bytesWithout = best_->bytes;
-  if (with) plateauChoice_.bytesWith = with->bytes;
-  const auto better = [&](const Tried& a, const Tried& b) {
+/// Takes a lattice with the plateau where it is better.
+void VoxelSearch::considerPlateau(std::optional<Tried> with) {
+  const auto isBetter = [&](const Tried& a, const Tried& b) {
     return goal_.psnr ? a.bytes < b.bytes : a.psnr > b.psnr;
   };
-  plateauChoice_.used = with && (!best_ || better(*with, *best_));
-  if (plateauChoice_.used) best_ = std::move(with);
+  if (with && (!best_ || isBetter(*with, *best_))) best_ = std::move(with);
 }
 
 // ---- A size
@@ -440,8 +443,7 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fullest(const SparseVolume& volum
   std::optional<Tried> best;
   for (int n = 0; n < kSizeTrials && !search.ended(); ++n) {
     Setting setting{search.next(), first.price};
-    if (first.levels > 0.0)
-      setting.levels = std::max(std::round(0.5 * plateau_.value / boundOf(setting)), 1.0);
+    if (first.levels > 0.0) setting.levels = levelsOf(setting);
     auto now = unlessCancelled([&] { return sized(volume, setting); });
     if (!now && best) break;
     if (!now) throw Cancelled();
@@ -477,10 +479,9 @@ void VoxelSearch::tryForSize() {
   const Setting first{2.0 + 8.0 * double(*goal_.bytes) / active, price()};
   best_ = fullest(tryOn_, first);
   if (!hasPlateau()) return;
-  plateauChoice_.tried = true;
   Setting setting = best_ ? best_->setting : first;
   setting.levels = 1.0;
-  decidePlateau(best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
+  considerPlateau(best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
                       : fullest(tryOn_, setting));
 }
 
@@ -491,7 +492,7 @@ std::uint64_t VoxelSearch::exactBytes() const {
   const SparseVolume& values = valuesOf(job_);
   const bool isOwn = &values == &job_.input.source;
   const SparseVolume sample =
-      isOwn || !isSampled() ? SparseVolume{} : sampleOf(values, goal_.sampleBricks);
+      isOwn || !isSampled() ? SparseVolume{} : sampleOf(values, sampleBricks_);
   const SparseVolume& on = isOwn ? tryOn_ : isSampled() ? sample : values;
   return exactBytesOf(on, values) + besides_;
 }
@@ -548,47 +549,19 @@ VoxelCandidate VoxelSearch::candidateOf(Tried tried) const {
   return made;
 }
 
-/// The voxels of the whole volume whose lattice has the plateau: about as many levels as on the sample,
-/// and the price that then uses up the PSNR.
-std::optional<VoxelSearch::Tried> VoxelSearch::withPlateau(const SparseVolume& volume,
-                                                           Setting setting) const {
-  std::optional<Tried> best;
-  double tooFew = 0.0;
-  for (int n = 0; n < kPlateauTrials && setting.levels > tooFew; ++n) {
-    Tried now = tried(volume, setting);
-    const double excess = now.psnr - *goal_.psnr;
-    if (excess < 0.0) tooFew = std::max(tooFew, setting.levels);
-    const double wanted = setting.levels * std::pow(10.0, -excess / 20.0);
-    if (excess >= 0.0 && (!best || setting.levels <= best->setting.levels)) best = std::move(now);
-    double next = std::max(std::ceil(wanted), tooFew + 1.0);
-    if (excess > kFinalTolerance) next = std::min(next, setting.levels - 1.0);
-    if (best && next >= best->setting.levels) break;
-    setting.levels = next;
-  }
-  for (const double price : kPlateauPrices) {
-    if (!best || price <= best->setting.price) continue;
-    Tried now = tried(volume, {.price = price, .levels = best->setting.levels});
-    if (now.psnr < *goal_.psnr) break;
-    best = std::move(now);
-  }
-  return best;
-}
-
 /// Quantised voxels of the whole volume with the setting that is best on the sample.
 std::optional<VoxelCandidate> VoxelSearch::finished() {
   if (!best_) return std::nullopt;
   if (!isSampled()) return candidateOf(std::move(*best_));
   const SparseVolume& source = job_.input.source;
   const Setting setting = best_->setting;
-  if (goal_.bytes) {
-    auto found = fullest(source, setting);
-    return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
-  }
-  if (setting.levels == 0.0) {
-    auto found = coarsest(source, *goal_.psnr, setting, kThriftyTrials, kFinalTolerance);
-    return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
-  }
-  auto found = withPlateau(source, setting);
+  std::optional<Tried> found;
+  if (goal_.bytes)
+    found = fullest(source, setting);
+  else if (setting.levels > 0.0)
+    found = fewestLevels(source, setting, kPlateauTrials, kFinalTolerance);
+  else
+    found = coarsest(source, *goal_.psnr, setting, kThriftyTrials, kFinalTolerance);
   return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
 }
 
@@ -613,8 +586,7 @@ std::optional<VoxelCandidate> VoxelSearch::run() {
   });
   if (!found && goal_.psnr) throw Cancelled();
   if (found && goal_.bytes && found->bytes > *goal_.bytes) found.reset();
-  if (found && plateauChoice_.used) plateauChoice_.bytesWith = found->bytes;
-  if (found) found->seconds = seconds_, found->plateau = plateauChoice_;
+  if (found) found->seconds = seconds_;
   return found;
 }
 

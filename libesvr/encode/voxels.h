@@ -10,20 +10,12 @@
 
 namespace esvr::encode {
 
-/// Whether a lattice that contains the most frequent value, the plateau, was tried and is used, and the bytes of the best
-/// grids with and without it, if they were measured.
-struct PlateauChoice {
-  bool tried = false, used = false;
-  std::optional<std::uint64_t> bytesWith{}, bytesWithout{};
-};
-
 /// A grid that holds voxels.
 struct VoxelCandidate {
   StoredGrid grid;
   std::uint64_t bytes = 0;  ///< bytes that it adds to the file or frame
   double psnr = 0.0;        ///< quality, dB; +inf if the voxels are exact
   double seconds = 0.0;     ///< wall-clock seconds of the whole search
-  PlateauChoice plateau;
 };
 
 /// The most frequent value of the active voxels besides 0 and the background, which are exact anyway,
@@ -34,16 +26,9 @@ struct Plateau {
 
 class VoxelSearch {
  public:
-  struct Goal {
-    std::optional<double> psnr{};  ///< dB over the box
-    std::optional<std::uint64_t>
-        bytes{};  ///< bytes that the grid may add to a file, without a PSNR
-    /// Bricks of the sample. Volumes of less than four times as many are tried as a whole.
-    std::size_t sampleBricks = kTuning.sampleBricks;
-  };
-
   /// The job must outlive the search.
-  VoxelSearch(const Job& job, const Goal& goal);
+  /// \param sampleBricks  bricks of the sample; volumes of less than four times as many are tried as a whole
+  VoxelSearch(const Job& job, const Aim& goal, std::size_t sampleBricks = kTuning.sampleBricks);
   VoxelSearch(const VoxelSearch&) = delete;
   VoxelSearch& operator=(const VoxelSearch&) = delete;
 
@@ -96,14 +81,15 @@ class VoxelSearch {
   [[nodiscard]] std::optional<Tried> coarsest(const SparseVolume& volume, double psnr,
                                               const Setting& first, int mostTrials,
                                               double tolerance) const;
-  [[nodiscard]] std::optional<Tried> fewestLevels(double psnr, const Setting& first) const;
+  [[nodiscard]] std::optional<Tried> fewestLevels(const SparseVolume& volume, const Setting& first,
+                                                  int mostTrials, double tolerance) const;
+  [[nodiscard]] double levelsOf(const Setting& setting) const;
   [[nodiscard]] std::optional<Tried> thriftyForPsnr(const Tried& plain) const;
   [[nodiscard]] std::optional<Tried> sized(const SparseVolume& volume,
                                            const Setting& setting) const;
   [[nodiscard]] std::optional<Tried> fullest(const SparseVolume& volume,
                                              const Setting& first) const;
   [[nodiscard]] VoxelCandidate candidateOf(Tried tried) const;
-  [[nodiscard]] std::optional<Tried> withPlateau(const SparseVolume& volume, Setting setting) const;
   [[nodiscard]] std::optional<VoxelCandidate> finished();
 
   [[nodiscard]] std::uint64_t exactBytes() const;
@@ -112,10 +98,11 @@ class VoxelSearch {
   [[nodiscard]] bool exactIsBest();
   void tryForPsnr();
   void tryForSize();
-  void decidePlateau(std::optional<Tried> with);
+  void considerPlateau(std::optional<Tried> with);
 
   const Job& job_;
-  Goal goal_;
+  Aim goal_;
+  std::size_t sampleBricks_;
   Box box_;
   double peak_ = 0.0;
   SparseVolume sample_;        ///< empty if the sample is the whole volume
@@ -131,7 +118,6 @@ class VoxelSearch {
   std::optional<Tried> best_;           ///< the best setting on the sample
   std::optional<std::uint64_t> exact_;  ///< bytes of exact voxels, if they may be the better ones
   std::optional<Candidate> tooLarge_;
-  PlateauChoice plateauChoice_;
   double seconds_ = 0.0;
 };
 
