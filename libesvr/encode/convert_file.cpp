@@ -4,6 +4,7 @@
 #include "esvr/convert_file.h"
 
 #include <tbb/global_control.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <atomic>
@@ -21,10 +22,58 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/bytes.h"
 
 namespace esvr {
 
-// One grid, and several at the same time.
+// ---- Equal inputs
+
+namespace {
+
+template <class Items>
+void putHash(format::ByteWriter& out, const Items& items) {
+  const XXH128_hash_t hash = XXH3_128bits(items.data(), items.size() * sizeof(items.front()));
+  for (const std::uint64_t word : {std::uint64_t(items.size()), hash.low64, hash.high64})
+    out.put(word);
+}
+
+void putVolume(format::ByteWriter& out, const SparseVolume& volume) {
+  for (const auto v : {volume.origin.x, volume.origin.y, volume.origin.z}) out.put(v);
+  out.put(volume.background);
+  putHash(out, volume.bricks);
+  putHash(out, volume.values);
+  putHash(out, volume.active);
+}
+
+/// A hash of the active voxels of a volume, whatever their values.
+InputKey activeKeyOf(const SparseVolume& volume) {
+  std::vector<Coord> corners;
+  std::vector<BrickMask> masks;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    corners.push_back(volume.brickCorner(b));
+    masks.push_back(volume.active[b]);
+  }
+  format::ByteWriter out;
+  putHash(out, corners);
+  putHash(out, masks);
+  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
+  return {hash.low64, hash.high64};
+}
+
+}  // namespace
+
+InputKey keyOf(const ConvertInput& input) {
+  format::ByteWriter out;
+  // The class decides whether a grid is a narrow band. A lossless goal refuses doubles.
+  out.put(std::uint8_t(input.descriptor.gridClass == GridClass::kLevelSet));
+  out.put(std::uint8_t(input.descriptor.valueType == ValueType::kDouble));
+  putVolume(out, input.source);
+  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
+  return {hash.low64, hash.high64};
+}
+
+// ---- One grid, and several at the same time
 
 namespace encode {
 

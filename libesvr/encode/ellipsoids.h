@@ -139,7 +139,7 @@ class EllipsoidSearch {
   Margin margin_;
   double slope_;               ///< growth of the quality by twice the ellipsoids, dB
   bool slopeIsKnown_ = false;  ///< from two short fits
-  bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below `below_`
+  bool isTooLarge_ = false;    ///< the short fits showed that the grid cannot stay below `below_`
   std::uint64_t maxCount_;
   std::optional<Attempt> draft_;           ///< the last short fit
   std::vector<FitPoint> drafted_;          ///< all of them that are like it

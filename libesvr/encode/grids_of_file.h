@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esvr/convert_file.h"
@@ -18,9 +19,6 @@ struct Wish {
   /// frame, if there is one.
   const StoredGrid* expected = nullptr;
 };
-
-/// A hash of the active voxels of a volume, whatever their values. (references.cpp)
-[[nodiscard]] InputKey activeKeyOf(const SparseVolume& volume);
 
 /// Reads and converts single grids of a file.
 class GridConverter {
@@ -82,12 +80,29 @@ class GridConverter {
 void forEachAtOnce(std::size_t count, std::size_t threads,
                    const std::function<void(std::size_t)>& body);
 
+// What follows is in share_grids.cpp.
+
 /// Chooses for each grid of voxels another grid of the file that its voxels refer to, where that takes fewer
 /// bytes, and gives the file the compact layout. If the goal is a PSNR or a preset, the voxels are chosen again
-/// for this coding. (share_grids.cpp)
+/// for this coding.
 void shareGrids(const FileOptions& options, GridConverter& converter, ConvertedFile& made);
 
-/// A grid without its content, of which a file has little more than the record. (share_grids.cpp)
+/// Chooses a reference for a grid of voxels. Candidates are compared on a sample of its bricks.
+/// \param grids  the grids of a file. Those of `candidates` must be before `grid`, and those among
+///               them that hold no voxels are ignored.
+/// \return the reference with which the voxels take the fewest bytes of those that were tried, the
+///         empty one among them. They may take even fewer without a reference (bytesAdded).
+[[nodiscard]] VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
+                                             std::span<const std::size_t> candidates);
+
+/// The grid that a reference names, with the values that are expected for the grid that refers to
+/// it. As ConvertOptions::previous it makes a conversion choose voxels that take few bytes with this
+/// reference.
+/// \param grid  refers to the other grid
+[[nodiscard]] StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
+                                      const VoxelReference& reference);
+
+/// A grid without its content, of which a file has little more than the record.
 [[nodiscard]] StoredGrid recordAlone(const StoredGrid& grid);
 
 }  // namespace esvr::encode

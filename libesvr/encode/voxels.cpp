@@ -41,12 +41,11 @@ DecodedValues decodedValues(const Job& job) {
 
 // ---- The sample
 
-SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
+std::vector<std::size_t> sampledBricks(const std::vector<Coord>& bricks, std::size_t count) {
   constexpr std::size_t kBricksOfRun = 64;
-  if (volume.brickCount() <= bricks) return volume;
-  const std::size_t runs = std::max<std::size_t>(bricks / kBricksOfRun, 1);
-  const auto order = codec::codingOrder(volume.bricks);
-  const std::size_t length = bricks / runs, last = order.size() - length;
+  const std::size_t runs = std::max<std::size_t>(count / kBricksOfRun, 1);
+  const auto order = codec::codingOrder(bricks);
+  const std::size_t length = count / runs, last = order.size() - length;
   std::vector<std::size_t> chosen;
   for (std::size_t run = 0; run < runs; ++run) {
     const auto first = std::ptrdiff_t(runs > 1 ? run * last / (runs - 1) : last / 2);
@@ -55,10 +54,15 @@ SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
   }
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
+  if (volume.brickCount() <= bricks) return volume;
   SparseVolume sample;
   sample.origin = volume.origin;
   sample.background = volume.background;
-  for (const std::size_t b : chosen) {
+  for (const std::size_t b : sampledBricks(volume.bricks, bricks)) {
     const auto values = volume.brickValues(b);
     sample.bricks.push_back(volume.bricks[b]);
     sample.active.push_back(volume.active[b]);
@@ -482,7 +486,7 @@ void VoxelSearch::tryForSize() {
   Setting setting = best_ ? best_->setting : first;
   setting.levels = 1.0;
   considerPlateau(best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
-                      : fullest(tryOn_, setting));
+                        : fullest(tryOn_, setting));
 }
 
 // ---- The result

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "encode/job.h"
 #include "encode/tuning.h"
@@ -135,9 +136,11 @@ class VoxelSearch {
 /// nine times the true bytes.
 [[nodiscard]] Candidate estimateExactVoxels(const Job& job);
 
-/// About so many bricks of a volume at their positions, in runs of 64 at equal distances; the whole volume
-/// if it has no more. The bricks of a run follow each other in the order in which voxels are coded, so
-/// that most of them are neighbours.
+/// The numbers, increasing, of about so many of more bricks, in runs of 64 at equal distances. The bricks of a run follow
+/// each other in the order in which voxels are coded, so that most of them are neighbours.
+[[nodiscard]] std::vector<std::size_t> sampledBricks(const std::vector<Coord>& bricks,
+                                                     std::size_t count);
+/// These bricks of a volume at their positions; the whole volume if it has no more.
 [[nodiscard]] SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks);
 
 /// How voxels store the active mask of a grid: as StorageOptions say, but exactly for a level set,

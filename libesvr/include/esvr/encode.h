@@ -1,7 +1,6 @@
 #pragma once
-/// The encoder: converts a volume to a stored grid for a goal, quantises fitted ellipsoids, leaves the
-/// less important ones out, corrects signs, and chooses what the grids of a file share. vdb2esvr and
-/// esvr-compare call it for every grid.
+/// The encoder: converts a volume to a stored grid for a goal, quantises fitted ellipsoids, leaves the less important ones
+/// out, and corrects signs. vdb2esvr and esvr-compare call it for every grid.
 ///
 /// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
 /// (three for Preset::kHigh and above the usual effort; four of at most half the length where ellipsoids take
@@ -264,24 +263,6 @@ struct PaperConversion {
 [[nodiscard]] PaperConversion convertByPaper(const ConvertInput& input,
                                              const PaperFitOptions& options,
                                              const StorageOptions& storage);
-
-// Chooses the grids of a file whose voxels are the context of other grids' voxels (VoxelReference),
-// so that they take fewer bytes.
-
-/// Chooses a reference for a grid of voxels. Candidates are compared on a sample of its bricks.
-/// \param grids  the grids of a file. Those of `candidates` must be before `grid`, and those among
-///               them that hold no voxels are ignored.
-/// \return the reference with which the voxels take the fewest bytes of those that were tried, the
-///         empty one among them. They may take even fewer without a reference (bytesAdded).
-[[nodiscard]] VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
-                                             std::span<const std::size_t> candidates);
-
-/// The grid that a reference names, with the values that are expected for the grid that refers to
-/// it. As ConvertOptions::previous it makes a conversion choose voxels that take few bytes with this
-/// reference.
-/// \param grid  refers to the other grid
-[[nodiscard]] StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
-                                      const VoxelReference& reference);
 
 // Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
 // quantised, and their intensities are solved for again.
