@@ -16,79 +16,12 @@
 
 namespace esvr::encode {
 
-// ---- What a job says
+namespace {
 
-bool isCancelled(const Job& job) {
-  const CancelToken* cancel = job.options.fit.cancel;
-  return cancel && cancel->cancelled();
-}
+/// Share of the active voxels with an extreme value from which on a volume saturates.
+constexpr double kSaturatedShare = 0.05;
 
-const SparseVolume& valuesOf(const Job& job) {
-  return job.judge ? job.judge->values() : job.input.source;
-}
-
-double boxGain(const SparseVolume& volume, const ConvertOptions& options) {
-  const Box box = options.fit.box.value_or(activeBox(volume));
-  std::uint64_t active = 0;
-  for (std::size_t b = 0; options.fit.box && b < volume.brickCount(); ++b)
-    for (int v = 0; v < kBrickVoxels; ++v)
-      active += volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v));
-  if (!options.fit.box) active = activeVoxelCount(volume);
-  active -= std::min(active, options.filledVoxels);
-  const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
-  return 10.0 * std::log10(std::max(share, 1.0));
-}
-
-bool isToned(const Job& job) { return job.judge && job.judge->tone().isOn(); }
-
-bool seesPictures(const Job& job) { return job.judge && job.judge->seesPictures(); }
-
-double psnrOf(const Job& job, SparseVolume volume) {
-  if (job.judge) return (*job.judge)(std::move(volume)).quality;
-  forgiveFilled(job.input.source, job.options.filled, volume);
-  return psnrOverBox(job.input.source, volume,
-                     {.box = job.options.fit.box, .peak = job.options.fit.peak});
-}
-
-double psnrOf(const Job& job, const StoredGrid& grid) {
-  return psnrOf(job, decodeGrid(grid, {.memory = memoryOf(job.input.source)}));
-}
-
-Representation representationOf(const Job& job) {
-  if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
-  return job.options.representation;
-}
-
-double effortFactor(int effort) {
-  constexpr double kStep = 1.6;
-  return std::pow(kStep, effort - kUsualEffort);
-}
-
-Plan planOf(const Job& job) {
-  const Tuning& tuning = kTuning;
-  const int effort = job.options.effort;
-  const double wanted = plannedIterations(job.options.fit);
-  const SparseVolume& fitted = job.averages ? *job.averages : job.input.source;
-  const double bricks = double(std::max<std::size_t>(fitted.brickCount(), 1));
-  const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;
-  const double shortest = std::min<double>(tuning.leastShortIterations, wanted);
-  const double inTime = onGpu ? wanted : wanted * tuning.bricksOfWholeFit / bricks;
-  const double inAMinute = std::max(tuning.leastWholeShare * wanted, shortest) *
-                           std::min(1.0, tuning.bricksInAMinute / bricks);
-  const double affordable = std::max(inTime, inAMinute);
-  const double most = std::max(effortFactor(effort), 1.0),
-               least = std::min(effortFactor(effort), 1.0);
-  const double usual = std::min(wanted, most * affordable);
-  Plan plan;
-  plan.fitsInTime = effort > kLeastEffort && usual >= shortest;
-  plan.wholeIterations = std::uint32_t(std::ceil(std::max({least * usual, shortest, 1.0})));
-  plan.shortIterations = std::min(plan.wholeIterations,
-                                  std::clamp(plan.wholeIterations / 4, tuning.leastShortIterations,
-                                             tuning.mostShortIterations));
-  plan.improves = inTime >= inAMinute || effort > kUsualEffort;
-  plan.wholeFits = job.options.fit.preset == Preset::kHigh ? 3 : 2;
-  return plan;
-}
+}  // namespace
 
 bool saturates(const SparseVolume& volume) {
   const ValueRange range = activeRange(volume);
@@ -105,7 +38,7 @@ bool saturates(const SparseVolume& volume) {
         return count;
       },
       std::plus<>());
-  return double(extreme) >= kTuning.saturatedShare * double(activeVoxelCount(volume));
+  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
 }
 
 // ---- The stored grid of a fit
@@ -212,6 +145,36 @@ std::uint64_t bytesOfEllipsoids(const StoredGrid& grid) {
 
 namespace {
 
+// How ellipsoids grow with their number. "Lab" refers to docs/lab-notes.md.
+
+/// Active voxels per ellipsoid of the first guess for a PSNR.
+constexpr double kVoxelsOfFirstGuess = 35.0;
+/// The price of an ellipsoid in a short fit relative to that in a whole one.
+constexpr double kShortFitPrice = 0.94;
+/// PSNR of a whole fit of 400 iterations less that of a short one of 100, dB: smoke1 and wdas have 1.3 to 1.6. Where many
+/// voxels saturate it is 5 to 6 (dragon, aneurism), since a clamped voxel has no gradient. Of tones, smoke1 has 0.4 to 0.9,
+/// judged by what is seen.
+constexpr double kShortFitBehind = 1.6, kShortFitBehindSaturated = 5.0, kTonedShortFitBehind = 0.8;
+/// The steepest growth of the PSNR by twice the ellipsoids, dB (aneurism has 6.7).
+constexpr double kSteepestDbPerDoubling = 7.0;
+/// Usual growth of what is seen of tones by twice the ellipsoids, dB: smoke1 has 2.9 to 3.4, the plume of 256 3.4,
+/// hydrogen_atom 2.3 to 4.2. Of values, and of the short fits of large volumes, it is kDbPerDoubling (plume of 640: 5.4).
+constexpr double kTonedDbPerDoubling = 3.0;
+/// dB by which a fit with both signs must be better to be taken (Lab, "Signs").
+constexpr double kSignsGain = 0.25;
+
+// How long fits are, as shares of the iterations of a whole one: a fit that continues a short one, one that continues a
+// whole one (Lab, "Continued fits"), one that continues the frame before (Lab, "Frames that continue"), and one from seeds
+// for a size, unless many voxels saturate.
+constexpr double kContinuedShare = 0.4, kContinuedWholeShare = 0.15, kContinuedFrameShare = 0.3,
+                 kSizedShare = 0.6;
+
+/// Of values (Lab, "More ellipsoids or more bits"), and of tones: smoke1 of 25 KB has 34.8 dB of what is
+/// seen with these, and 34.5 with those of values.
+constexpr Rounding kRounding{0.9, 2.5, 1.0}, kTonedRounding{0.5, 1.2, 1.65};
+
+// Where a search goes.
+
 /// A fit continues an earlier one if it has 0.85 to 1.8 times the ellipsoids of that. Where more are dropped, a fit from
 /// seeds is better (dragon, 0.6 times as many: 49.4 dB, and 47.3 dB continued). With 1.5 instead of 1.8, more short fits
 /// are made (Lab, "Where a search goes").
@@ -223,7 +186,7 @@ constexpr double kGrownFrom = 0.9;
 /// fits are made to come that near.
 constexpr double kNear = kMostGrowth * kGrownFrom;
 constexpr int kMostDrafts = 3;
-/// Whole fits of ellipsoids that take at most half of Tuning::bytesOfWholeFit, each of which has at most half of the iterations.
+/// Whole fits of ellipsoids that take at most half of kBytesOfWholeFit, each of which has at most half of the iterations.
 constexpr int kMostSmallFits = 4;
 /// Largest number of ellipsoids of the first of them. Where it is farther from the PSNR than kFar times its number of
 /// ellipsoids, one with as many times fewer shows the slope.
@@ -295,9 +258,9 @@ EllipsoidSearch::EllipsoidSearch(const Job& job, const Aim& goal, const StoredGr
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
       saturates_(saturates(job.input.source)),
-      rounding_(isToned(job) ? kTuning.tonedRounding : kTuning.rounding),
+      rounding_(isToned(job) ? kTonedRounding : kRounding),
       margin_(compact_ ? compactMargin(rounding_.usualLoss * rounding_.factor) : kFloat32Margin),
-      slope_(isToned(job_) && plan_.improves ? kTuning.tonedDbPerDoubling : kDbPerDoubling),
+      slope_(isToned(job_) && plan_.improves ? kTonedDbPerDoubling : kDbPerDoubling),
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
@@ -305,7 +268,7 @@ EllipsoidSearch::EllipsoidSearch(const Job& job, const Aim& goal, const StoredGr
 
 void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
   below_ = bytes;
-  maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kTuning.leastBytesEach) + 1);
+  maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kLeastBytesEach) + 1);
 }
 
 namespace {
@@ -350,8 +313,8 @@ Attempt attempted(const Job& job, const FitOptions& options) {
 /// The number of ellipsoids of the first short fit for a size, and for a PSNR.
 double firstCount(const Job& job) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
-    return kGrownFrom * double(size->bytes) / kTuning.usualBytesEach;
-  return std::min(double(activeVoxelCount(job.input.source)) / kTuning.voxelsOfFirstGuess,
+    return kGrownFrom * double(size->bytes) / kUsualBytesEach;
+  return std::min(double(activeVoxelCount(job.input.source)) / kVoxelsOfFirstGuess,
                   kMostOfFirstDraft);
 }
 
@@ -401,12 +364,11 @@ Attempt EllipsoidSearch::wholeFit(double count) const {
   const Attempt* from = startFor(double(*options.count));
   const bool isShort = from && draft_ && from == &*draft_;
   if (goal_.bytes && (!from || isShort)) {
-    if (!saturates_) options.iterations = shareOfWhole(kTuning.sizedShare);
+    if (!saturates_) options.iterations = shareOfWhole(kSizedShare);
     return attempted(job_, options);
   }
   if (!from) return attempted(job_, options);
-  return continued(from->grid, count,
-                   isShort ? kTuning.continuedShare : kTuning.continuedWholeShare);
+  return continued(from->grid, count, isShort ? kContinuedShare : kContinuedWholeShare);
 }
 
 /// A fit that continues other ellipsoids. It adds some, or drops the weakest first.
@@ -463,14 +425,13 @@ double EllipsoidSearch::behind() const {
   if (before_) return 0.0;
   const double whole = plan_.wholeIterations, brief = plan_.shortIterations;
   if (!isToned(job_)) {
-    const double usual = saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind;
+    const double usual = saturates_ ? kShortFitBehindSaturated : kShortFitBehind;
     return usual * std::clamp(0.5 * std::log2(whole / brief), 0.0, 1.0);
   }
   // The error that iterations leave falls with their number: the plume of 256 has 168 and 42 of them.
   const auto gain = [](double from, double to) { return 1.0 / from - 1.0 / to; };
-  const double most = kTuning.mostShortIterations;
-  return kTuning.tonedShortFitBehind *
-         std::min(gain(brief, whole) / gain(most, 4.0 * most), kMostBehind);
+  const double most = kMostShortIterations;
+  return kTonedShortFitBehind * std::min(gain(brief, whole) / gain(most, 4.0 * most), kMostBehind);
 }
 
 double EllipsoidSearch::aim() const { return *goal_.psnr + margin_.aim; }
@@ -506,8 +467,8 @@ void EllipsoidSearch::learnFrom(const Attempt& other) {
   const double doublings = std::log2(countOf(other) / countOf(*draft_));
   if (std::abs(doublings) < std::log2(kMinSlopeRatio)) return;
   slopeIsKnown_ = true;
-  slope_ = std::clamp((other.psnr - draft_->psnr) / doublings, kMinSlope,
-                      2.0 * kTuning.steepestDbPerDoubling);
+  slope_ =
+      std::clamp((other.psnr - draft_->psnr) / doublings, kMinSlope, 2.0 * kSteepestDbPerDoubling);
 }
 
 /// The number of ellipsoids of the first short fit for a PSNR.
@@ -519,7 +480,7 @@ double EllipsoidSearch::firstCountForPsnr() const {
   }
   const double guess = firstCount(job_);
   // Where ellipsoids win, they usually take about half of the bytes.
-  return below_ ? std::min(guess, 0.5 * double(*below_) / kTuning.usualBytesEach) : guess;
+  return below_ ? std::min(guess, 0.5 * double(*below_) / kUsualBytesEach) : guess;
 }
 
 // Large ellipsoids are fitted to averages, whose iterations take a seventh of the time. Iterations of all voxels after
@@ -623,7 +584,7 @@ void EllipsoidSearch::continueFrame() {
   if (!options_.fit.bothSigns)
     options_.fit.bothSigns = std::ranges::any_of(before.field.chunks, hasNegative);
   const double bytes = double(bytesOfEllipsoids(before));
-  const double share = kTuning.continuedFrameShare * std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  const double share = kContinuedFrameShare * std::min(1.0, bytes / kBytesOfWholeFit);
   const double count = capped(kFewerInFrame * double(before.field.ellipsoidCount()));
   if (mayFitAverages(count)) fitAverages();
   draft_ = continued(before, count, share);
@@ -652,7 +613,7 @@ void EllipsoidSearch::decideSigns() {
   auto found = unlessCancelled([&]() -> std::optional<Attempt> {
     fit.bothSigns = true;
     Attempt both = shortFit(double(draft_->asked));
-    if (qualityForBytes(both) < qualityForBytes(*draft_) + kTuning.signsGain) return std::nullopt;
+    if (qualityForBytes(both) < qualityForBytes(*draft_) + kSignsGain) return std::nullopt;
     return both;
   });
   fit.bothSigns = found.has_value();
@@ -668,12 +629,12 @@ void EllipsoidSearch::forecast() {
   const bool isQuick = goal_.psnr.has_value();
   const CompactResult compact =
       compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
-  price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
+  price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kShortFitPrice;
   const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
   besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
   const double bytes =
       goal_.psnr ? price_ * countFor(drafted_, aim() - behind(), slope_) : double(*goal_.bytes);
-  const double share = std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  const double share = std::min(1.0, bytes / kBytesOfWholeFit);
   // Of a few ellipsoids, one more or less may miss a PSNR (hydrogen_atom with 40 dB), and fits are short.
   if (share <= 0.5) plan_.wholeFits = std::max(plan_.wholeFits, kMostSmallFits);
   plan_.wholeIterations = std::max(std::min(plan_.shortIterations, plan_.wholeIterations),
@@ -703,15 +664,15 @@ double EllipsoidSearch::expectedPsnr() const {
 }
 
 bool EllipsoidSearch::mayReach(double psnr) const {
-  return draft_->cancelled() || expectedPsnr() + kTuning.uncertainty >= psnr;
+  return draft_->cancelled() || expectedPsnr() + kUncertainty >= psnr;
 }
 
 bool EllipsoidSearch::mayStayBelow(std::uint64_t bytes) const {
   if (draft_->cancelled()) return true;
   if (isTooLarge_) return false;
-  const double least = aim() - behind() - kTuning.uncertainty;
+  const double least = aim() - behind() - kUncertainty;
   const bool isKnown = slopeIsKnown_ || expectedBytes_ > 0;
-  const double fewest = least > draft_->psnr ? kTuning.steepestDbPerDoubling : kMinSlope;
+  const double fewest = least > draft_->psnr ? kSteepestDbPerDoubling : kMinSlope;
   const double count = countFor(drafted_, least, isKnown ? slope_ : fewest);
   return count <= double(maxCount_) && double(besides_) + price_ * count <= double(bytes);
 }

@@ -7,9 +7,22 @@
 #include <vector>
 
 #include "encode/job.h"
-#include "encode/tuning.h"
 
 namespace esvr::encode {
+
+/// Bytes that an ellipsoid takes usually (by default 6.7 in smoke1 and plume_256, 8.1 in dragon) and at least.
+inline constexpr double kUsualBytesEach = 7.5, kLeastBytesEach = 4.5;
+/// dB by which a whole fit may exceed its forecast (dragon, neuron_rp140212).
+inline constexpr double kUncertainty = 1.0;
+/// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the bytes of a short one,
+/// which for fewer bytes is worth less time in proportion (hydrogen_atom: 560 bytes in 12 CPU seconds with all iterations).
+inline constexpr double kBytesOfWholeFit = 4096.0;
+
+/// The loss by quantising, dB of PSNR over the box, at which further bytes gain as much in more ellipsoids as in
+/// more bits, the one above which fewer ellipsoids are better, and the loss of quality for each dB of it.
+struct Rounding {
+  double usualLoss, mostLoss, factor;
+};
 
 /// A fit, and its grid in float32.
 struct Attempt {
@@ -78,7 +91,7 @@ class EllipsoidSearch {
   [[nodiscard]] std::uint64_t expectedBytes() const { return expectedBytes_; }
 
   /// False if the drafts show that the grid cannot stay below a number of bytes, or, for a size, that
-  /// it cannot have a PSNR, even if it is better than expected by Tuning::uncertainty.
+  /// it cannot have a PSNR, even if it is better than expected by kUncertainty.
   [[nodiscard]] bool mayStayBelow(std::uint64_t bytes) const;
   [[nodiscard]] bool mayReach(double psnr) const;
 
@@ -141,10 +154,10 @@ class EllipsoidSearch {
   bool slopeIsKnown_ = false;  ///< from two short fits
   bool isTooLarge_ = false;    ///< the short fits showed that the grid cannot stay below `below_`
   std::uint64_t maxCount_;
-  std::optional<Attempt> draft_;           ///< the last short fit
-  std::vector<FitPoint> drafted_;          ///< all of them that are like it
-  double price_ = kTuning.usualBytesEach;  ///< expected bytes of an ellipsoid
-  std::uint64_t besides_ = 0;              ///< bytes of the grid's other sections
+  std::optional<Attempt> draft_;    ///< the last short fit
+  std::vector<FitPoint> drafted_;   ///< all of them that are like it
+  double price_ = kUsualBytesEach;  ///< expected bytes of an ellipsoid
+  std::uint64_t besides_ = 0;       ///< bytes of the grid's other sections
   std::uint64_t expectedBytes_ = 0, needed_ = 0;
   std::vector<Attempt> attempts_;
   std::optional<double>

@@ -79,6 +79,9 @@ void forgiveFilled(const SparseVolume& source, const VoxelLayer* filled, SparseV
 /// The representation of a job. Float32 storage is a form of ellipsoids.
 [[nodiscard]] Representation representationOf(const Job& job);
 
+/// The most iterations of a short fit. With 100, fit/tuning.h makes the most of them.
+inline constexpr std::uint32_t kMostShortIterations = 100;
+
 /// How much work a conversion may do, by its effort, its device and its size. It does not depend on
 /// measured times, so that the result does not either.
 struct Plan {

@@ -13,7 +13,6 @@
 
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
-#include "encode/tuning.h"
 #include "encode/voxels.h"
 #include "esvr/encode.h"
 #include "esvr/grid_coding.h"
@@ -35,6 +34,12 @@ bool leavesTheMeasure(const Goal& goal) {
 
 /// dB by which the PSNR of a preset's pictures is lower than that of its values.
 constexpr double kPicturesBelowValues = 2.0;
+/// dB by which the PSNR over the active voxels may be lower than that of the transmittance, where a tone curve is used.
+/// Cycles shows smoke1 with 34 dB over the active voxels at 41 to 43 dB (docs/convert.md).
+constexpr double kPicturesAboveValues = 4.0;
+/// The ninth decile of the active values relative to their median from which on a tone curve is tried, and the dB by which
+/// it must be better.
+constexpr double kLeastToneRange = 3.0, kToneGain = 0.1;
 
 /// The sum of ofBrick(values) over the bricks, in an order that does not depend on the number of threads.
 template <class OfBrick>
@@ -109,7 +114,7 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
   pictures_.emplace(input.source, options.fit.box);
   mass_ = sumOfBricks(input.source, sumOf);
   if (leavesTheMeasure(options.goal))
-    valueGain_ = (tone.isOn() ? kTuning.picturesAboveValues : -kPicturesBelowValues) -
+    valueGain_ = (tone.isOn() ? kPicturesAboveValues : -kPicturesBelowValues) -
                  boxGain(input.source, options);
 }
 
@@ -228,7 +233,7 @@ ToneCurve likelyTone(const SparseVolume& volume) {
     return double(*at);
   };
   const double median = quantile(0.5), quartile = quantile(0.75), high = quantile(0.9);
-  if (high < kTuning.leastToneRange * median) return {};
+  if (high < kLeastToneRange * median) return {};
   return {float(std::cbrt(median * quartile * quartile))};
 }
 
@@ -264,7 +269,7 @@ ToneChoice chosenByFits(ToneCurve likely, const ConvertInput& given,
   if (isCoarse) options.filledVoxels = 0, options.filled = nullptr;
   const Scouted with = scouted(likely, input, options, count),
                 without = scouted({}, input, options, count);
-  const bool isBetter = with.forTones - without.forTones > kTuning.toneGain;
+  const bool isBetter = with.forTones - without.forTones > kToneGain;
   ToneChoice choice{isBetter ? likely : ToneCurve{}, isBetter ? with.point : without.point};
   if (isCoarse) choice.scout->psnr -= kAveragesAbove;
   return choice;

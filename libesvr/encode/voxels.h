@@ -7,9 +7,13 @@
 #include <vector>
 
 #include "encode/job.h"
-#include "encode/tuning.h"
 
 namespace esvr::encode {
+
+/// Factor by which an estimate of the bytes of voxels may be wrong. Within it, voxels are coded.
+inline constexpr double kEstimateMargin = 1.2;
+/// Bricks of the sample on which voxels of large volumes are tried, in runs of 64 neighbours.
+inline constexpr std::size_t kBricksOfSample = 2048;
 
 /// A grid that holds voxels.
 struct VoxelCandidate {
@@ -29,7 +33,7 @@ class VoxelSearch {
  public:
   /// The job must outlive the search.
   /// \param sampleBricks  bricks of the sample; volumes of less than four times as many are tried as a whole
-  VoxelSearch(const Job& job, const Aim& goal, std::size_t sampleBricks = kTuning.sampleBricks);
+  VoxelSearch(const Job& job, const Aim& goal, std::size_t sampleBricks = kBricksOfSample);
   VoxelSearch(const VoxelSearch&) = delete;
   VoxelSearch& operator=(const VoxelSearch&) = delete;
 
@@ -69,7 +73,7 @@ class VoxelSearch {
 
   [[nodiscard]] bool isSampled() const { return share_ < 1.0; }
   [[nodiscard]] double shareOf(const SparseVolume& volume) const;
-  [[nodiscard]] bool hasPlateau() const { return plateau_.share >= kTuning.plateauShare; }
+  [[nodiscard]] bool hasPlateau() const;
   [[nodiscard]] double price() const;
   [[nodiscard]] double boundOf(const Setting& setting) const;
   [[nodiscard]] VoxelLayer layerOf(const SparseVolume& volume, const Setting& setting,

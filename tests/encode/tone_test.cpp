@@ -290,7 +290,7 @@ TEST(Tone, LayersHaveTheErrorsOfTheBoxOfTheConversion) {
   options.fit.box = Box{{8, 8, 8}, {23, 23, 23}};
   options.fit.count = 3000;
   options.representation = Representation::kEllipsoids;
-  options.fit.iterations = 5;
+  options.fit.iterations = 40;
   const StoredGrid grid = convertVolume({fog(), volume}, options).grid;
   ASSERT_GE(layerCount(grid), 2u);
   ASSERT_EQ(grid.layerErrors.size(), layerCount(grid));

@@ -134,7 +134,7 @@ TEST_F(VoxelSearch, SlowKnowsFromASampleWhatALargeVolumeTakes) {
   EXPECT_GE(found->psnr, 45.0);
   EXPECT_LT(found->psnr, 45.5);
   EXPECT_EQ(found->psnr, psnrOverBox(volume_, decodeGrid(found->grid)));
-  const double margin = encode::kTuning.estimateMargin;
+  const double margin = encode::kEstimateMargin;
   EXPECT_LT(double(expected.bytes), margin * double(found->bytes));
   EXPECT_GT(double(expected.bytes) * margin, double(found->bytes));
   encode::VoxelSearch size(job_, {.bytes = found->bytes}, 192);
