@@ -129,7 +129,7 @@ class GridDecoder {
     if (content.size() != count * kChunkRecordBytes)
       in.fail("not a table of " + counted(count, "chunk"));
     std::vector<ChunkRecord> records;
-    for (std::uint32_t c = 0; c < count; ++c) records.push_back(getChunk(in));
+    for (std::uint32_t c = 0; c < count; ++c) codeChunk(in, records.emplace_back());
     return records;
   }
 
@@ -327,7 +327,8 @@ std::vector<MetaItem> readFileMetadata(SectionReader& sections) {
   if (!sections.has(section)) return {};
   const auto content = sections.get(section);
   ByteReader in(content, sections.place(section));
-  auto items = getMetadata(in);
+  std::vector<MetaItem> items;
+  codeMetadata(in, items);
   in.finish();
   return items;
 }
@@ -339,7 +340,8 @@ CarriedGrid readCarriedGrid(SectionReader& sections, std::uint32_t number, Carri
   const SectionId record{SectionKind::kCarried, number};
   const auto content = sections.get(record);
   ByteReader in(content, sections.place(record));
-  CarriedGrid grid = getCarried(in);
+  CarriedGrid grid;
+  codeCarried(in, grid);
   in.finish();
   const SectionId stored{SectionKind::kCarriedBytes, number};
   if (bytes == CarriedBytes::kAll) grid.bytes = sections.getCarried(stored);
