@@ -97,12 +97,6 @@ Cover coarseOf(std::int32_t brick, double factor) {
   return {brickAt(begin), std::int32_t(std::ceil(end)) - 1};
 }
 
-std::vector<Coord> cornersOf(const SparseVolume& volume) {
-  std::vector<Coord> corners;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
-  return corners;
-}
-
 /// The coarse bricks of a list of bricks, increasing.
 std::vector<Coord> coarseBricks(std::span<const Coord> corners, double factor) {
   std::vector<Coord> coarse;
@@ -227,7 +221,7 @@ class Averager {
 
   /// \param signs  of the places without a brick of a level set that is complete; null: they have the background
   void add(const SparseVolume& volume, const EmptySigns* signs = nullptr) {
-    std::vector<Coord> bricks = cornersOf(volume);
+    std::vector<Coord> bricks = brickCorners(volume);
     for (Coord& brick : bricks) brick = brickOf(brick);
     parallelFor(std::size_t{0}, coarse_.size(), [&](std::size_t c) {
       forEachCovered(bricks, coarse_[c], rule_.factor, [&](std::size_t b) {
@@ -309,7 +303,7 @@ SparseVolume averagedSurface(const StoredGrid& grid, const AverageRule& rule,
                              const DecodeOptions& options) {
   const SparseVolume volume = decodeGrid(grid, options);
   const EmptySigns signs(volume);
-  return averagedBy(rule, coarseBricks(cornersOf(volume), rule.factor),
+  return averagedBy(rule, coarseBricks(brickCorners(volume), rule.factor),
                     [&](std::span<const Coord>, Averager& to) { to.add(volume, &signs); });
 }
 
@@ -413,24 +407,16 @@ VolumeGrid decodeAtResolution(const StoredGrid& grid, double factor, const Decod
 SparseVolume coarsened(const SparseVolume& volume, int factor) {
   requireFactor(factor);
   const AverageRule rule{.factor = double(factor), .background = volume.background};
-  return averagedBy(rule, coarseBricks(cornersOf(volume), factor),
+  return averagedBy(rule, coarseBricks(brickCorners(volume), factor),
                     [&](std::span<const Coord>, Averager& to) { to.add(volume); });
 }
 
 VectorGrid decodeVectorAtResolution(const std::string& name, StoredComponents components,
                                     double factor, const DecodeOptions& options) {
-  VectorGrid vectors;
-  DecodeOptions left = options;
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    VolumeGrid component = decodeAtResolution(components[c], factor, left);
-    if (c == 0) vectors.descriptor = std::move(component.descriptor);
-    vectors.background[c] = components[c].descriptor.background;
-    vectors.components[c] = std::move(component.volume);
-    const std::uint64_t bytes = vectors.components[c].values.size() * sizeof(float);
-    if (left.maxBytes != kNoMemoryLimit) left.maxBytes -= std::min(left.maxBytes, bytes);
-  }
-  vectors.descriptor.name = name;
-  return vectors;
+  return format::vectorsOf(name, components, options,
+                           [&](const StoredGrid& component, const DecodeOptions& left) {
+                             return decodeAtResolution(component, factor, left);
+                           });
 }
 
 Field amongOtherVoxels(Field field, double factor) {

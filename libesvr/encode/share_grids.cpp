@@ -15,6 +15,7 @@
 #include "encode/grids_of_file.h"
 #include "encode/voxels.h"
 #include "esvr/error.h"
+#include "format/section_table.h"
 #include "format/voxel_sections.h"
 
 namespace esvr {
@@ -112,7 +113,7 @@ class Likeness {
   }
 
   void addBrick(const SparseVolume& sample, std::size_t b, const SparseVolume& other) {
-    const auto at = findBrick(other, brickOf(sample.brickCorner(b) - other.origin));
+    const auto at = brickWith(other, sample.brickCorner(b));
     if (!at) {
       inEither_ += sample.active[b].count();
       return;
@@ -390,18 +391,15 @@ void encode::shareGrids(const FileOptions& options, GridConverter& converter, Co
 
 namespace {
 
-constexpr std::uint64_t kHeaderBytes = 48, kAlignment = 8;  // docs/format.md
-
 /// Bytes of a section with its row and its padding.
 std::uint64_t bytesOfSection(const SectionSummary& section) {
-  const std::uint64_t padded = (section.storedBytes + kAlignment - 1) / kAlignment * kAlignment;
-  return kSectionRowBytes + (section.sharedWith ? 0 : padded);
+  return kSectionRowBytes + (section.sharedWith ? 0 : format::alignUp(section.storedBytes));
 }
 
 }  // namespace
 
 std::uint64_t bytesWithoutSharing(const ConvertedFile& converted, const EsvrSummary& written) {
-  std::uint64_t bytes = kHeaderBytes;
+  std::uint64_t bytes = format::kHeaderBytes;
   bool areJoined = false;
   for (const SectionSummary& section : written.sections) {
     const bool isJoined = section.kind == "grid records";

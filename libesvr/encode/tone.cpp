@@ -84,8 +84,8 @@ void forgiveFilled(const SparseVolume& source, const VoxelLayer* filled, SparseV
   if (!filled) return;
   parallelFor(std::size_t{0}, filled->bricks.size(), [&](std::size_t b) {
     const Coord corner = filled->origin + filled->bricks[b] * kBrickSide;
-    const auto to = findBrick(volume, brickOf(corner - volume.origin));
-    const auto from = findBrick(source, brickOf(corner - source.origin));
+    const auto to = brickWith(volume, corner);
+    const auto from = brickWith(source, corner);
     if (!to || !from) return;
     forEachActive(filled->active[b], [&](int v) {
       volume.brickValues(*to)[std::size_t(v)] = source.brickValues(*from)[std::size_t(v)];

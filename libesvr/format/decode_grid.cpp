@@ -161,7 +161,7 @@ std::vector<Coord> withResidualBricks(const StoredGrid& grid, const RevoxeliseOp
 void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
   for (std::size_t r = 0; r < residual.bricks.size(); ++r) {
     const Coord corner = residual.origin + residual.bricks[r] * kBrickSide;
-    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    const auto b = brickWith(volume, corner);
     if (!b) continue;
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       float& value = volume.brickValues(*b)[v];
@@ -360,18 +360,11 @@ SparseVolume format::decodeBricks(const StoredGrid& grid, const DecodeOptions& o
 
 VectorGrid decodeVector(const std::string& name, StoredComponents components,
                         const DecodeOptions& options) {
-  VectorGrid vectors;
-  vectors.descriptor = components.front().descriptor;
-  vectors.descriptor.name = name;
-  DecodeOptions left = options;
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    vectors.background[c] = components[c].descriptor.background;
-    vectors.components[c] = decodeGrid(components[c], left);
-    const std::uint64_t bytes = vectors.components[c].values.size() * sizeof(float);
-    if (left.maxBytes != kNoMemoryLimit && !left.memory.isInFile(bytes))
-      left.maxBytes -= std::min(left.maxBytes, bytes);
-  }
-  return vectors;
+  return format::vectorsOf(name, components, options,
+                           [](const StoredGrid& component, const DecodeOptions& left) {
+                             return VolumeGrid{.descriptor = component.descriptor,
+                                               .volume = decodeGrid(component, left)};
+                           });
 }
 
 }  // namespace esvr

@@ -183,19 +183,6 @@ class TableCheck {
   const SectionTable& table_;
 };
 
-void checkZero(const ByteSource& source, std::uint64_t begin, std::uint64_t end) {
-  constexpr std::uint64_t kPiece = 1 << 16;
-  for (; begin < end; begin += std::min(kPiece, end - begin)) {
-    const auto bytes = source.read(begin, std::min(kPiece, end - begin));
-    const auto at =
-        std::find_if(bytes.begin(), bytes.end(), [](auto b) { return b != std::byte{}; });
-    if (at != bytes.end())
-      throw BadInput(source.name() + ": byte " +
-                     std::to_string(begin + std::uint64_t(at - bytes.begin())) +
-                     " belongs to no section and is not zero");
-  }
-}
-
 }  // namespace
 
 void checkTable(const std::string& file, const SectionTable& table) {
@@ -205,6 +192,19 @@ void checkTable(const std::string& file, const SectionTable& table) {
 
 void checkRows(const std::string& file, const SectionTable& table) {
   TableCheck(file, table).checkRows();
+}
+
+void checkZero(const ByteSource& source, std::uint64_t begin, std::uint64_t end) {
+  constexpr std::uint64_t kPiece = 1 << 16;
+  for (; begin < end; begin += std::min(kPiece, end - begin)) {
+    const auto bytes = source.read(begin, std::min(kPiece, end - begin));
+    const auto at =
+        std::find_if(bytes.begin(), bytes.end(), [](auto b) { return b != std::byte{}; });
+    if (at != bytes.end())
+      throw BadInput(source.name() + ": byte " +
+                     std::to_string(begin + std::uint64_t(at - bytes.begin())) +
+                     " belongs to no part and is not zero");
+  }
 }
 
 void checkGaps(const ByteSource& source, const SectionTable& table) {
