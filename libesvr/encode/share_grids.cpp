@@ -29,24 +29,6 @@ constexpr std::size_t kSampleBricks = 64;
 /// Candidates that are tried on the sample, of those that are most alike.
 constexpr std::size_t kMostTried = 4;
 
-/// Some bricks of a layer, in their order.
-VoxelLayer partOf(const VoxelLayer& layer, const std::vector<std::size_t>& bricks) {
-  VoxelLayer part;
-  part.form = layer.form;
-  part.divisor = layer.divisor;
-  part.palette = layer.palette;
-  part.origin = layer.origin;
-  part.background = layer.background;
-  for (const std::size_t b : bricks) {
-    const auto codes = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
-    part.bricks.push_back(layer.bricks[b]);
-    part.active.push_back(layer.active[b]);
-    part.vacant.push_back(layer.vacant[b]);
-    part.codes.insert(part.codes.end(), codes, codes + kBrickVoxels);
-  }
-  return part;
-}
-
 Coord brickIn(const VoxelLayer& layer, Coord brick, const VoxelLayer& other) {
   return brick + brickOf(layer.origin - other.origin);
 }
@@ -60,7 +42,7 @@ VoxelLayer partNear(const VoxelLayer& layer, const VoxelLayer& sample) {
   std::vector<std::size_t> chosen;
   for (std::size_t b = 0; b < layer.bricks.size(); ++b)
     if (near.contains(layer.bricks[b])) chosen.push_back(b);
-  return partOf(layer, chosen);
+  return codec::partOf(layer, chosen);
 }
 
 /// Sums over pairs of numbers.
@@ -172,9 +154,10 @@ std::vector<AlikeGrid> mostAlike(std::span<const StoredGrid> grids, const VoxelL
 VoxelReference encode::chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
                                        std::span<const std::size_t> candidates) {
   const VoxelLayer& whole = *grids[grid].voxels;
-  const VoxelLayer sample = whole.bricks.size() <= kSampleBricks
-                                ? whole
-                                : partOf(whole, encode::sampledBricks(whole.bricks, kSampleBricks));
+  const VoxelLayer sample =
+      whole.bricks.size() <= kSampleBricks
+          ? whole
+          : codec::partOf(whole, encode::sampledBricks(whole.bricks, kSampleBricks));
   const auto alike = mostAlike(grids, sample, candidates);
   std::vector<ReferenceTrial> trials(1);
   for (const AlikeGrid& candidate : alike)
@@ -194,7 +177,7 @@ StoredGrid encode::expectedFrom(std::span<const StoredGrid> grids, std::size_t g
   expected.farBackground = grids[grid].farBackground;
   expected.field.background = grids[grid].field.background;
   if (!reference.grid) {
-    expected.voxels = partOf(*grids[grid].voxels, {});
+    expected.voxels = codec::partOf(*grids[grid].voxels, {});
     return expected;
   }
   VoxelLayer& layer = *(expected.voxels = grids[*reference.grid].voxels);

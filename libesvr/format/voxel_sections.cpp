@@ -435,16 +435,10 @@ void putHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer& previou
 }
 
 VoxelLayer getHead(ByteReader& in, const VoxelLayer& previous) {
+  if (in.getEnum(LayerHead::kSame, "head of voxels") == LayerHead::kSame)
+    return codec::headOf(previous);
   VoxelLayer layer;
-  if (in.getEnum(LayerHead::kSame, "head of voxels") == LayerHead::kOwn) {
-    codeHead(in, layer);
-    return layer;
-  }
-  layer.form = previous.form;
-  layer.divisor = previous.divisor;
-  layer.palette = previous.palette;
-  layer.origin = previous.origin;
-  layer.background = previous.background;
+  codeHead(in, layer);
   return layer;
 }
 
