@@ -54,10 +54,6 @@ double largestDifference(const SparseVolume& a, const SparseVolume& b) {
   return std::max(largestOver(a, b), largestOver(b, a));
 }
 
-double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
-  return largestDifference(volume, volumeOf(layer));
-}
-
 // ---- Exact layers
 
 namespace {
@@ -174,7 +170,7 @@ VoxelLayer exactLayerOf(const SparseVolume& volume, std::vector<float> palette) 
 }
 
 std::uint64_t codedBytes(const VoxelLayer& layer) {
-  return codec::codeWithin(codec::chooseModel(layer), UINT64_MAX, layer).bytes +
+  return codec::bytesOfCodes(codec::chooseModel(layer), layer) +
          layer.palette.size() * sizeof(float);
 }
 

@@ -161,8 +161,7 @@ struct CodedPart {
 CodedPart chooseCodes(const VoxelModel& model, const Thrift& thrift, std::uint64_t mostBytes,
                       VoxelLayer& layer);
 
-/// The same part for the codes that the layer has.
-[[nodiscard]] CodedPart codeWithin(const VoxelModel& model, std::uint64_t mostBytes,
-                                   const VoxelLayer& layer);
+/// The bytes of the codes that a layer has.
+[[nodiscard]] std::uint64_t bytesOfCodes(const VoxelModel& model, const VoxelLayer& layer);
 
 }  // namespace esvr::codec

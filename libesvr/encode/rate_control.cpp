@@ -102,17 +102,18 @@ std::vector<float> intensitiesOfFirstLayers(const RateTrial& trial, std::size_t 
 
 }  // namespace
 
-RateTrials::RateTrials(const StoredGrid& grid, const RateTarget& target)
+RateTrials::RateTrials(const StoredGrid& grid, const SparseVolume& source,
+                       const CompactOptions& options)
     : bricks_(grid.bricks),
-      target_{target.source, format::ruleOf(grid), target.box, bricks_,
+      target_{source, format::ruleOf(grid), options.box.value_or(activeBox(source)), bricks_,
               grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOfCorners(knownCorners(target_))),
-      sampleTarget_{target_.source, target_.rule, target.box, sampleBricks_, true},
-      problem_(target_, target.device),
-      sampleProblem_(sampleTarget_, target.device),
+      sampleTarget_{source, target_.rule, target_.box, sampleBricks_, true},
+      problem_(target_, options.device),
+      sampleProblem_(sampleTarget_, options.device),
       field_(grid.field),
-      quick_(target.quick),
-      peak_(target.peak ? *target.peak : peakOf(target.source)) {
+      quick_(options.quick),
+      peak_(options.peak ? *options.peak : peakOf(source)) {
   if (quick_) {
     auto intensities = intensitiesOf(field_);
     problem_.setShapes(field_);
@@ -462,12 +463,7 @@ Compactor::Compactor(const StoredGrid& grid, const SparseVolume& source,
       source_(source),
       options_(options),
       box_(options.box.value_or(activeBox(source))) {
-  if (grid.field.ellipsoidCount() == 0) return;
-  trials_.emplace(grid, RateTarget{.source = source,
-                                   .box = box_,
-                                   .device = options.device,
-                                   .peak = options.peak,
-                                   .quick = options.quick});
+  if (grid.field.ellipsoidCount() > 0) trials_.emplace(grid, source, options);
 }
 
 CompactResult Compactor::toGoal() {

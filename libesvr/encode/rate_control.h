@@ -29,22 +29,13 @@ struct RateTrial {
   std::uint64_t bytes = 0;  ///< bytes of the ellipsoids' sections
 };
 
-/// The reference of the measurements, the box that counts and the device that computes.
-struct RateTarget {
-  const SparseVolume& source;
-  Box box;
-  Device device;
-  std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(source)
-  /// Trials are rounded and counted only: the intensities are not solved for, and the error of a trial is that of the
-  /// float32 field. \ref RateTrials::measure gives the true one.
-  bool quick = false;
-};
-
 /// Quantises one grid with one set of steps after the other.
 class RateTrials {
  public:
+  /// \param options  their box, peak and device; `quick`: trials are rounded and counted only, the intensities are not
+  ///                 solved for, and the error of a trial is that of the float32 field. \ref measure gives the true one
   /// The source must outlive the object. \throws DeviceError  the GPU cannot be used
-  RateTrials(const StoredGrid& grid, const RateTarget& target);
+  RateTrials(const StoredGrid& grid, const SparseVolume& source, const CompactOptions& options);
   RateTrials(const RateTrials&) = delete;
   RateTrials& operator=(const RateTrials&) = delete;
 

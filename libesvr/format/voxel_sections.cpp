@@ -32,14 +32,14 @@ bool validSuccessor(Coord corner, const Coord* previous) {
   return localOf(corner) == Coord{} && (!previous || *previous < corner);
 }
 
-}  // namespace
-
 void requireBricks(std::span<const Coord> corners) {
   for (std::size_t i = 0; i < corners.size(); ++i)
     if (!validSuccessor(corners[i], i == 0 ? nullptr : &corners[i - 1]))
       throw RuntimeFailure("brick corner " + toString(corners[i]) +
                            " is not a multiple of 8 or not above the one before it");
 }
+
+}  // namespace
 
 std::vector<std::byte> putBricks(std::span<const Coord> corners) {
   requireBricks(corners);
@@ -142,12 +142,34 @@ int bitsOf(const std::vector<Coord>& bricks) {
   return bits;
 }
 
-/// Refuses codes that have no value.
-void checkCodes(const VoxelLayer& layer, const ByteReader& in) {
-  if (layer.form != VoxelForm::kPalette) return;
-  for (const auto code : layer.codes)
-    if (code < 0 || std::uint32_t(code) >= layer.palette.size())
-      in.fail("a voxel is not in the palette");
+/// Largest number of bricks that a section may have without a previous frame, so that a reader knows it before it
+/// allocates memory.
+std::uint64_t maxBricksIn(std::uint64_t bytes) {
+  return kMaxBricksPerByte * bytes + kMaxBricksPerByte - 1;
+}
+
+/// The number of bytes that a section needs for bricks that the previous frame has not.
+std::uint64_t bytesForBricks(std::uint64_t bricks) {
+  return (bricks + kMaxBricksPerByte - 1) / kMaxBricksPerByte;
+}
+
+/// Refuses bricks that reach out of the index space.
+void checkBricks(const VoxelLayer& layer, const ByteReader& in) {
+  const auto beyond = [](std::int32_t origin, std::int32_t brick) {
+    return std::int64_t(origin) + std::int64_t(brick + 1) * kBrickSide - 1 > Box::kMax;
+  };
+  for (const Coord b : layer.bricks)
+    if (beyond(layer.origin.x, b.x) || beyond(layer.origin.y, b.y) || beyond(layer.origin.z, b.z))
+      in.fail("a brick of voxels lies outside the index space");
+}
+
+/// Refuses codes without a value, and values that are not finite.
+void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
+  if (layer.form == VoxelForm::kPalette)
+    for (const auto code : layer.codes)
+      if (code < 0 || std::uint32_t(code) >= layer.palette.size())
+        in.fail("a voxel is not in the palette");
+  if (!allFinite(layer)) in.fail("a voxel is not finite");
 }
 
 void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelLayer& layer) {
@@ -261,36 +283,6 @@ void decodeStreams(ByteReader& in, const BrickCount& count, const codec::VoxelMo
   }
 }
 
-}  // namespace
-
-std::uint64_t maxBricksIn(std::uint64_t bytes) {
-  return kMaxBricksPerByte * bytes + kMaxBricksPerByte - 1;
-}
-
-std::uint64_t bytesForBricks(std::uint64_t bricks) {
-  return (bricks + kMaxBricksPerByte - 1) / kMaxBricksPerByte;
-}
-
-void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
-  budget.take(double(bricks) * decodedBytesPerBrick(bricks, budget.voxels()), where);
-}
-
-void checkBricks(const VoxelLayer& layer, const ByteReader& in) {
-  const auto beyond = [](std::int32_t origin, std::int32_t brick) {
-    return std::int64_t(origin) + std::int64_t(brick + 1) * kBrickSide - 1 > Box::kMax;
-  };
-  for (const Coord b : layer.bricks)
-    if (beyond(layer.origin.x, b.x) || beyond(layer.origin.y, b.y) || beyond(layer.origin.z, b.z))
-      in.fail("a brick of voxels lies outside the index space");
-}
-
-void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
-  checkCodes(layer, in);
-  if (!allFinite(layer)) in.fail("a voxel is not finite");
-}
-
-namespace {
-
 std::vector<std::byte> code(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
   codec::VoxelModel model = codec::chooseModel(layer);
@@ -328,6 +320,10 @@ std::uint64_t checksumOf(const VoxelLayer& layer) {
 
 }  // namespace
 
+void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
+  budget.take(double(bricks) * decodedBytesPerBrick(bricks, budget.voxels()), where);
+}
+
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   const CodedVoxels& coded = layer.coded;
   const bool isCoded = coded.section && coded.checksum == checksumOf(layer);
@@ -338,14 +334,6 @@ std::uint64_t keepCoded(VoxelLayer& layer) {
   auto section = std::make_shared<const std::vector<std::byte>>(putVoxels(layer));
   layer.coded = {checksumOf(layer), std::move(section)};
   return layer.coded.section->size();
-}
-
-bool takeMore(const VoxelLayer& layer, std::uint64_t bytes) {
-  const auto takesMore = [&](const codec::VoxelModel& model) {
-    return codec::codeWithin(model, bytes, layer).bytes > bytes;
-  };
-  const codec::VoxelModel model = codec::chooseModel(layer);
-  return takesMore(model) && (!codec::hasMirror(model) || takesMore(codec::withoutMirrors(model)));
 }
 
 VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,

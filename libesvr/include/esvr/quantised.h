@@ -248,7 +248,4 @@ struct ThriftyLayer {
 /// Largest absolute difference of two volumes' voxels over the bricks of both, active or not.
 [[nodiscard]] double largestDifference(const SparseVolume& a, const SparseVolume& b);
 
-/// Largest absolute difference of a layer's voxels from the volume's.
-[[nodiscard]] double largestError(const SparseVolume& volume, const VoxelLayer& layer);
-
 }  // namespace esvr
