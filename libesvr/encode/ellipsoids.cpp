@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "encode/rate_control.h"
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "encode/job.h"
+#include "encode/rate_control.h"
 
 namespace esvr::encode {
 

@@ -16,7 +16,6 @@
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
 #include "encode/non_finite.h"
-#include "encode/rate_control.h"
 #include "encode/signs.h"
 #include "encode/tone.h"
 #include "encode/voxels.h"

@@ -531,27 +531,23 @@ CompactResult Compactor::resultOf(RateTrial trial) {
   return result;
 }
 
-}  // namespace esvr::encode
-
-namespace esvr {
-
 CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
   for (const auto& chunk : grid.field.chunks)
     if (!chunk.ellipsoids.kappa.empty())
       throw RuntimeFailure("cannot quantise grid '" + shownName(grid.descriptor.name) +
                            "': its ellipsoids have kappas of their own");
-  encode::Compactor compactor(grid, source, options);
+  Compactor compactor(grid, source, options);
   if (options.quick || !options.psnr) return compactor.toGoal();
   if (grid.topology == TopologyKind::kMask) return compactor.toPsnrOfReader();
   CompactResult result = compactor.toGoal();
   // A reader may miss the PSNR of a GPU's trial near the precision of float32 only.
   const bool mayBeMissed =
-      options.device.kind == DeviceKind::kCuda && *options.psnr >= encode::kMaxPsnrOfMargin;
-  if (!mayBeMissed || encode::excessOf(result.grid, source, options) >= 0.0) return result;
+      options.device.kind == DeviceKind::kCuda && *options.psnr >= kMaxPsnrOfMargin;
+  if (!mayBeMissed || excessOf(result.grid, source, options) >= 0.0) return result;
   CompactOptions again = options;
   again.device = {};
   return compactGrid(grid, source, again);
 }
 
-}  // namespace esvr
+}  // namespace esvr::encode

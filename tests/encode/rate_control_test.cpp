@@ -20,6 +20,10 @@
 namespace esvr {
 namespace {
 
+using encode::compactGrid;
+using encode::CompactOptions;
+using encode::CompactResult;
+
 StoredGrid storedOf(StoredGrid grid, const encode::RateTrial& trial) {
   grid.field = trial.field;
   grid.quantised = trial.quantised;

@@ -31,6 +31,7 @@ namespace esvr {
 namespace {
 
 using encode::changeAcrossSurface;
+using encode::withSigns;
 using Distance = std::function<double(Coord)>;
 
 double toBall(Coord v) { return std::hypot(v.x - 23.5, v.y - 23.4, v.z - 23.3) - 15.0; }

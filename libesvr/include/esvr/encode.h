@@ -1,6 +1,6 @@
 #pragma once
-/// The encoder: converts a volume to a stored grid for a goal, quantises fitted ellipsoids, leaves the less important ones
-/// out, and corrects signs. vdb2esvr and esvr-compare call it for every grid.
+/// The encoder: converts a volume to a stored grid for a goal, and leaves the less important ellipsoids of a grid out.
+/// vdb2esvr and esvr-compare call it for every grid.
 ///
 /// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
 /// (three for Preset::kHigh and above the usual effort; four of at most half the length where ellipsoids take
@@ -247,7 +247,7 @@ struct Conversion {
 /// \throws CannotConvert  active voxels are 2^24 voxels or more apart
 /// \throws RuntimeFailure  the stored grid exceeds its bound; a voxel of a narrow band has another
 ///                         sign than in the source (the text names the grid and the voxel)
-/// Other exceptions are those of fit and compactGrid.
+/// \throws RuntimeFailure  no quantisation lattice can hold the ellipsoids. Other exceptions are those of fit.
 [[nodiscard]] Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options);
 
 struct PaperConversion {
@@ -259,49 +259,10 @@ struct PaperConversion {
 /// \throws UsageError  the volume is a narrow band; k is learned for each ellipsoid, but the
 ///                     storage is kCompact
 /// \throws BadInput  values are too large for sums, as for convertVolume
-/// Other exceptions are those of fitByPaper and compactGrid.
+/// Other exceptions are those of fitByPaper.
 [[nodiscard]] PaperConversion convertByPaper(const ConvertInput& input,
                                              const PaperFitOptions& options,
                                              const StorageOptions& storage);
-
-// Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
-// quantised, and their intensities are solved for again.
-
-struct CompactOptions {
-  /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32. With
-  /// 0.1 dB, a file is hardly worse than its fit; 0.3 dB would save 2 to 11 % of the bytes.
-  double loss = 0.1;
-  /// PSNR over the box, in dB, that the smallest result must reach. It replaces `loss`.
-  std::optional<double> psnr{};
-  /// Bytes that the ellipsoids of the best result may take. It replaces `loss` and `psnr`.
-  std::optional<std::uint64_t> bytes{};
-  std::optional<Box> box{};      ///< box of the PSNR; default: the active bounding box
-  std::optional<double> peak{};  ///< peak of the PSNR, above 0; default: peakOf() of the source
-  Device device{};               ///< device that evaluates the trials
-  bool layerErrors = true;       ///< whether the errors of the layers are measured
-  /// The result is made in about the time of three evaluations of the grid: the steps are those with
-  /// which a search would begin, or, for `bytes`, the first that fit; the intensities are rounded but
-  /// not solved for, and there are no errors of layers. It serves for
-  /// forecasts, and to complete a conversion that was cancelled.
-  bool quick = false;
-};
-
-struct CompactResult {
-  StoredGrid grid;  ///< the quantised grid; its field is the one that a reader gets
-  QuantiserSteps steps;
-  double loss = 0.0;        ///< dB; negative if solving for the intensities gained more
-  std::uint64_t bytes = 0;  ///< bytes of the ellipsoids
-};
-
-/// Compacts a grid. The result is deterministic on one device. Devices round differently, so that
-/// they may choose different steps. If the wanted PSNR or size is out of reach, the result is the
-/// nearest one found.
-/// \param grid  a grid that makeStoredGrid made from `source`; Ellipsoids::kappa must be empty
-/// \throws RuntimeFailure  no quantisation lattice can hold the ellipsoids, or each ellipsoid has
-///                         its own kappa
-/// \throws DeviceError  the GPU cannot be used
-[[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
-                                        const CompactOptions& options = {});
 
 // Coarser levels of detail of a grid: the most important of its ellipsoids.
 
@@ -314,14 +275,5 @@ struct CompactResult {
 /// depends on kappa only. The result has no quantised form, no layers and no residual. A grid that
 /// has no more ellipsoids is returned unchanged.
 [[nodiscard]] StoredGrid heaviest(StoredGrid grid, std::size_t count);
-
-// A residual corrects the sum of ellipsoids voxel by voxel where its sign is wrong.
-
-/// Corrects the sign of every voxel of a narrow band where the sum has another one than the source,
-/// by a residual. A reader on any machine then finds the signs of the source: evaluations on different
-/// machines differ by rounding (field.h), and the residual includes a margin for that.
-/// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
-/// \return the grid without a residual if no sign is wrong
-[[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
 
 }  // namespace esvr
