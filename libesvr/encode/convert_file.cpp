@@ -263,10 +263,8 @@ struct Twin {
   double secondsRead = 0.0;
 };
 
-/// The twins by their index.
 using Twins = std::map<std::size_t, Twin>;
 
-/// True if another grid may have the same voxels.
 bool mayHaveTwin(const std::vector<GridSource>& grids, const GridSource& grid) {
   return std::ranges::count_if(grids, [&](const GridSource& other) {
            return grid.activeVoxels == other.activeVoxels && grid.activeBox == other.activeBox;
@@ -338,7 +336,6 @@ std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size)
   throw UsageError(text + "; the size allows " + std::to_string(size));
 }
 
-/// Subtracts without passing 0.
 std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
 
 /// The bytes that grids were found to need, by their indices.
@@ -456,7 +453,6 @@ class ByteShares {
     return encodeEsvr(file).size() + kPadding - encodeEsvr(records_).size();
   }
 
-  /// Bytes of a converted grid with its twins.
   [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored,
                                              const StoredGrid* previous) {
     const std::uint64_t bytes = bytesInFrame(stored, previous);
@@ -643,7 +639,6 @@ std::vector<StoredVector> vectorsOf(const std::vector<GridSource>& sources,
   return vectors;
 }
 
-/// Bytes that a vector adds to a file.
 std::uint64_t bytesOfVector(const std::vector<GridConversion>& grids, const StoredVector& vector) {
   std::vector<StoredGrid> components;
   for (std::size_t c = 0; c < kComponents; ++c)

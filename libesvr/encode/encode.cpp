@@ -138,7 +138,6 @@ class Choice {
     return std::uint64_t(kBytesPerWork * work / effortFactor(job_.options.effort));
   }
 
-  /// Iterations of a whole fit of so many bytes.
   double wholeIterations(std::uint64_t bytes) const {
     return plan_.wholeIterations * std::min(1.0, double(bytes) / kBytesOfWholeFit);
   }
@@ -161,7 +160,6 @@ class Choice {
     return std::move(*made);
   }
 
-  /// True if exact voxels keep to the size.
   bool exactFits() {
     const Candidate exact = estimateExactVoxels(job_);
     const double margin = exact.estimated ? kEstimateMargin : 1.0;
@@ -438,7 +436,6 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
   return made;
 }
 
-/// Checks the decoded grid against the bound.
 void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
   const double error = largestDifference(input.source, decoded);
   if (error > bound)
@@ -459,7 +456,6 @@ void requirePromises(const Job& job, const StoredGrid& grid) {
   if (job.options.fit.narrowBand) requireSigns(job.input, decoded);
 }
 
-/// True if the errors of a goal have a bound.
 bool isBounded(const Goal& goal) {
   return std::holds_alternative<BoundGoal>(goal) || std::holds_alternative<RelativeBoundGoal>(goal);
 }
@@ -485,7 +481,6 @@ void requirePossible(const ConvertOptions& options) {
 /// of float32.
 constexpr float kLargestSummable = 0x1p120f;
 
-/// The first brick of a volume for which `is` holds, or nothing.
 template <class Is>
 std::optional<std::size_t> firstBrick(const SparseVolume& volume, const Is& is) {
   using Range = tbb::blocked_range<std::size_t>;

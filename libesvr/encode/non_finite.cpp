@@ -28,7 +28,6 @@ namespace esvr::encode {
 
 namespace {
 
-/// A voxel of a volume.
 struct VoxelPlace {
   std::uint32_t brick = 0;
   std::int32_t v = 0;
@@ -177,7 +176,6 @@ SparseVolume withFilledVoxels(const SparseVolume& volume, ValueType valueType, F
 
 namespace {
 
-/// True if the values of a grid are stored as they are.
 bool storesValues(const Goal& goal) {
   const auto* within = std::get_if<BoundGoal>(&goal);
   return std::holds_alternative<LosslessGoal>(goal) || (within && within->bound == 0.0);

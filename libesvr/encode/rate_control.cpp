@@ -136,7 +136,6 @@ double RateTrials::measure(const RateTrial& trial) {
   return errorOf(trial.field, intensitiesOf(trial.field)).squares;
 }
 
-/// The error of a field against the source.
 StoredError RateTrials::errorOf(const Field& field, std::span<const float> intensities) {
   problem_.setShapes(field);
   return problem_.error(intensities);

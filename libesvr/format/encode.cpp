@@ -207,7 +207,6 @@ void addRelated(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid>
   out.addRaw({SectionKind::kRelated, g}, kRequired, std::move(*content));
 }
 
-/// \param grids  those of the file
 void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> grids) {
   const StoredGrid& grid = grids[g];
   if (grid.topology == TopologyKind::kMask)

@@ -68,7 +68,6 @@ struct ThresholdChoice {
   double iou = 0.0;  ///< intersection over union of the active voxels of source and result
 };
 
-/// The voxels by their activity.
 class Histogram {
  public:
   void add(const VoxelRule& rule, float value, float wanted, bool active) {
@@ -126,7 +125,6 @@ class Histogram {
   std::vector<Tally> bins_ = std::vector<Tally>(kBins);
 };
 
-/// Adds the voxels of a brick that lie in a box.
 void addBrick(const SparseVolume& source, const VoxelRule& rule, const Box& box, Coord corner,
               std::span<const float> values, Histogram& histogram) {
   const auto b = brickWith(source, corner);

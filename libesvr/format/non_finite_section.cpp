@@ -118,7 +118,6 @@ NonFiniteCounts countsOf(const VoxelLayer& layer) {
 
 namespace {
 
-/// True if a palette has 0 and increasing numbers of kinds.
 bool isPaletteOfKinds(const std::vector<float>& palette) {
   const auto isKind = [](float value) {
     return value == 0.0f || value == 1.0f || value == 2.0f || value == 3.0f;

@@ -220,7 +220,6 @@ void checkGaps(const ByteSource& source, const SectionTable& table) {
 
 namespace {
 
-/// The header's content.
 struct Header {
   std::uint16_t versionMajor = 0, versionMinor = 0;
   std::uint32_t sections = 0;

@@ -204,7 +204,6 @@ void codeDivisor(Side& side, Coded<Side, double>& divisor) {
     if (!(std::isfinite(divisor) && divisor > 0.0)) side.fail("the divisor of voxels");
 }
 
-/// The form, the divisor, the origin, the background and the palette.
 template <class Side>
 void codeHead(Side& side, Coded<Side, VoxelLayer>& layer) {
   codeEnum(side, layer.form, VoxelForm::kPalette, "form of voxels");
@@ -357,7 +356,6 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
 
 namespace {
 
-/// The number of bricks that the context has not.
 std::uint64_t newBricks(const VoxelLayer& layer, const codec::PastVoxels& past) {
   return std::uint64_t(std::ranges::count_if(
       layer.bricks, [&](const Coord brick) { return past.find(brick) == BrickIndex::kNone; }));
