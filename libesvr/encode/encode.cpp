@@ -100,11 +100,11 @@ class Choice {
     ellipsoids_.emplace(job_, goal_);
     seconds_ += secondsOf([&] { ellipsoids_->draft(); });
     figures_ = Candidate{*goal_.bytes, ellipsoids_->expectedPsnr(), true, seconds_};
-    std::optional<Candidate> expected;
+    std::optional<Candidate> expected, tooLarge;
     (void)unlessCancelled([&] {
       if (isCancelled(job_)) return false;
-      if (voxels_->mayReach(ellipsoids_->expectedPsnr() - kUncertainty))
-        expected = voxels_->estimate();
+      tooLarge = voxels_->tooLargeFor(ellipsoids_->expectedPsnr() - kUncertainty);
+      if (!tooLarge) expected = voxels_->estimate();
       return true;
     });
     if (expected && !isCancelled(job_) && !ellipsoids_->mayReach(*expected->psnr))
@@ -115,7 +115,7 @@ class Choice {
         conversion_ &&
         (!expected || *figures_->psnr >= *expected->psnr + (expected->estimated ? kSampleDb : 0.0));
     if (isBetter || (conversion_ && isCancelled(job_)))
-      return ellipsoidsInsteadOf(expected ? expected : voxels_->tooLarge());
+      return ellipsoidsInsteadOf(expected ? expected : tooLarge);
     auto voxels = finishedVoxels();
     if (!voxels && !conversion_) throw tooSmall(ellipsoids_->needed());
     if (!voxels || (conversion_ && *figures_->psnr > voxels->psnr))

@@ -191,12 +191,12 @@ RootRange octaves() { return {kCoarsest, kFinest, kNarrowest}; }
 
 }  // namespace
 
-Candidate estimateExactVoxels(const Job& job) {
+Candidate estimateExactVoxels(const Job& job, std::size_t sampleBricks) {
   const SparseVolume& source = valuesOf(job);
   std::uint64_t bytes = 0;
   bool isSampled = false;
   const double seconds = secondsOf([&] {
-    const SparseVolume sample = sampleFor(job, source, kBricksOfSample);
+    const SparseVolume sample = sampleFor(job, source, sampleBricks);
     isSampled = sample.brickCount() > 0;
     bytes = exactBytesOf(isSampled ? sample : source, source) + bytesBeside(job);
   });
@@ -271,27 +271,25 @@ double VoxelSearch::boundOf(const Setting& setting) const {
   return range_ * std::exp2(-setting.octave);
 }
 
-/// \param tooMany  set to the expected bytes of the codes if these clearly exceed the size, so that
-///                 the work stopped and the layer is of no use; null: the work never stops
-VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setting,
-                                std::uint64_t* tooMany) const {
-  VoxelLayer layer = nearestLayer(volume, boundOf(setting), voxelActivity(job_), voxelSigns(job_));
-  if (setting.price == 0.0) return layer;
+/// \param isSized  the work stops where codes clearly exceed the size (ThriftyLayer::tooMany)
+ThriftyLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setting,
+                                  bool isSized) const {
+  const double bound = boundOf(setting);
+  ThriftyLayer made{nearestLayer(volume, bound, voxelActivity(job_), voxelSigns(job_))};
+  if (setting.price == 0.0) return made;
   const StoredGrid* previous = job_.options.previous;
   ThriftOptions thrift{setting.price, previous && previous->voxels ? &*previous->voxels : nullptr,
                        job_.options.keepsPastErrors ? kErrorsKept : 0.0, voxelSigns(job_),
                        isToned(job_) ? kMassPrice : 0.0};
-  if (tooMany) {
+  if (isSized) {
     const double left = double(*goal_.bytes - std::min(*goal_.bytes, besides_));
-    thrift.mostBytes =
-        std::uint64_t(kCodesBeyondSize * left * shareOfBytes(volume, boundOf(setting)));
+    thrift.mostBytes = std::uint64_t(kCodesBeyondSize * left * shareOfBytes(volume, bound));
   }
-  ThriftyLayer thrifty = thriftyLayer(volume, std::move(layer), thrift);
-  if (tooMany && thrifty.tooMany) *tooMany = *thrifty.tooMany;
-  if (seesPictures(job_) && !thrifty.tooMany)
-    thrifty.layer.divisor /=
-        job_.judge->massFactor(&volume == &sample_ ? sampleMass_ : mass_, volumeOf(thrifty.layer));
-  return std::move(thrifty.layer);
+  made = thriftyLayer(volume, std::move(made.layer), thrift);
+  if (seesPictures(job_) && !made.tooMany)
+    made.layer.divisor /=
+        job_.judge->massFactor(&volume == &sample_ ? sampleMass_ : mass_, volumeOf(made.layer));
+  return made;
 }
 
 double VoxelSearch::shareOf(const SparseVolume& volume) const {
@@ -308,7 +306,7 @@ double VoxelSearch::psnrOn(const SparseVolume& volume, const VoxelLayer& layer) 
 }
 
 VoxelSearch::Tried VoxelSearch::tried(const SparseVolume& volume, const Setting& setting) const {
-  Tried made{setting, layerOf(volume, setting)};
+  Tried made{setting, layerOf(volume, setting).layer};
   made.psnr = psnrOn(volume, made.layer);
   return made;
 }
@@ -442,16 +440,17 @@ void VoxelSearch::considerPlateau(std::optional<Tried> with) {
 /// layer and PSNR then.
 std::optional<VoxelSearch::Tried> VoxelSearch::sized(const SparseVolume& volume,
                                                      const Setting& setting) const {
-  std::uint64_t tooMany = 0;
-  Tried made{setting, layerOf(volume, setting, &tooMany)};
-  if (tooMany > 0) {
+  const double bound = boundOf(setting);
+  ThriftyLayer thrifty = layerOf(volume, setting, true);
+  Tried made{setting, {}};
+  if (thrifty.tooMany) {
     made.bytes =
-        std::max(std::uint64_t(double(tooMany) / shareOfBytes(volume, boundOf(setting))) + besides_,
+        std::max(std::uint64_t(double(*thrifty.tooMany) / shareOfBytes(volume, bound)) + besides_,
                  *goal_.bytes + 1);
-    made.layer = {};
     return made;
   }
-  made.bytes = bytesOf(volume, made.layer, boundOf(setting));
+  made.layer = std::move(thrifty.layer);
+  made.bytes = bytesOf(volume, made.layer, bound);
   if (made.bytes <= *goal_.bytes) made.psnr = psnrOn(volume, made.layer);
   return made;
 }
@@ -478,20 +477,20 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fullest(const SparseVolume& volum
   return best;
 }
 
-bool VoxelSearch::mayReach(double psnr) {
-  bool may = true;
+std::optional<Candidate> VoxelSearch::tooLargeFor(double psnr) {
+  std::optional<Candidate> tooLarge;
   seconds_ += secondsOf([&] {
     if (job_.options.previous || !std::isfinite(psnr) || !(range_ > 0.0)) return;
     auto plain =
         coarsest(tryOn_, psnr, {psnr / kDbPerOctave - 1.0}, kNearestTrials, kPsnrTolerance);
-    if (!plain) return;
+    if (!plain || hasPlateau()) return;
     const auto made = sized(tryOn_, {plain->setting.octave, price()});
     const double margin = isSampled() ? kEstimateMargin : 1.0;
-    may = hasPlateau() || double(made->bytes) <= margin * double(*goal_.bytes);
-    if (!may) tooLarge_ = Candidate{made->bytes, plain->psnr, true};
+    if (double(made->bytes) > margin * double(*goal_.bytes))
+      tooLarge = Candidate{made->bytes, plain->psnr, true};
   });
-  if (tooLarge_) tooLarge_->seconds = seconds_;
-  return may;
+  if (tooLarge) tooLarge->seconds = seconds_;
+  return tooLarge;
 }
 
 void VoxelSearch::tryForSize() {
@@ -509,14 +508,8 @@ void VoxelSearch::tryForSize() {
 
 // ---- The result
 
-/// About the bytes of a grid of exact voxels.
 std::uint64_t VoxelSearch::exactBytes() const {
-  const SparseVolume& values = valuesOf(job_);
-  const bool isOwn = &values == &job_.input.source;
-  const SparseVolume sample =
-      isOwn || !isSampled() ? SparseVolume{} : sampleOf(values, sampleBricks_);
-  const SparseVolume& on = isOwn ? tryOn_ : isSampled() ? sample : values;
-  return exactBytesOf(on, values) + besides_;
+  return estimateExactVoxels(job_, sampleBricks_).bytes;
 }
 
 /// A judge sees the volume as a whole. By how much its quality exceeds the PSNR of a sample is found with
@@ -526,7 +519,7 @@ void VoxelSearch::matchJudge() {
   const SparseVolume& source = job_.input.source;
   double octave = goal_.psnr ? *goal_.psnr / kDbPerOctave - 1.0 : kOctaveOfSize;
   for (int n = 0; n < 2; ++n) {
-    const VoxelLayer layer = layerOf(source, {.octave = octave});
+    const VoxelLayer layer = layerOf(source, {.octave = octave}).layer;
     const double quality = psnrOn(source, layer);
     SparseVolume made = volumeOf(layer);
     forgiveFilled(source, job_.options.filled, made);

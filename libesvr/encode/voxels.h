@@ -42,10 +42,9 @@ class VoxelSearch {
   /// \return nothing if no voxels can be that small
   [[nodiscard]] std::optional<Candidate> estimate();
 
-  /// For a size: false if the coarsest voxels with a PSNR are clearly too large, which takes less time
-  /// to find out than estimate(). They are recorded by tooLarge() then.
-  [[nodiscard]] bool mayReach(double psnr);
-  [[nodiscard]] const std::optional<Candidate>& tooLarge() const { return tooLarge_; }
+  /// For a size: the coarsest voxels with a PSNR if they are clearly too large, which takes less time to find out than
+  /// estimate(); nothing if they may fit.
+  [[nodiscard]] std::optional<Candidate> tooLargeFor(double psnr);
 
   /// The smallest voxels found that reach the PSNR, or the best ones that keep to the size. If the
   /// search is cancelled, the first ones that meet the goal.
@@ -76,8 +75,8 @@ class VoxelSearch {
   [[nodiscard]] bool hasPlateau() const;
   [[nodiscard]] double price() const;
   [[nodiscard]] double boundOf(const Setting& setting) const;
-  [[nodiscard]] VoxelLayer layerOf(const SparseVolume& volume, const Setting& setting,
-                                   std::uint64_t* tooMany = nullptr) const;
+  [[nodiscard]] ThriftyLayer layerOf(const SparseVolume& volume, const Setting& setting,
+                                     bool isSized = false) const;
   [[nodiscard]] double psnrOn(const SparseVolume& volume, const VoxelLayer& layer) const;
   [[nodiscard]] Tried tried(const SparseVolume& volume, const Setting& setting) const;
   [[nodiscard]] double shareOfBytes(const SparseVolume& volume, double bound) const;
@@ -122,7 +121,6 @@ class VoxelSearch {
   bool hasTried_ = false;
   std::optional<Tried> best_;           ///< the best setting on the sample
   std::optional<std::uint64_t> exact_;  ///< bytes of exact voxels, if they may be the better ones
-  std::optional<Candidate> tooLarge_;
   double seconds_ = 0.0;
 };
 
@@ -138,7 +136,8 @@ class VoxelSearch {
 /// "Estimating the bytes of exact voxels", are 0.94 to 1.08 times the true bytes of volumes without
 /// symmetry. A sample hardly contains mirror images and copies of bricks; with them, the estimate may be
 /// nine times the true bytes.
-[[nodiscard]] Candidate estimateExactVoxels(const Job& job);
+[[nodiscard]] Candidate estimateExactVoxels(const Job& job,
+                                            std::size_t sampleBricks = kBricksOfSample);
 
 /// The numbers, increasing, of about so many of more bricks, in runs of 64 at equal distances. The bricks of a run follow
 /// each other in the order in which voxels are coded, so that most of them are neighbours.

@@ -56,13 +56,12 @@ TEST_F(VoxelSearch, SaysWhichPsnrIsOutOfReachOfASize) {
   const std::uint64_t bytes = 4000;
   const double best = ofBytes(bytes)->psnr;
   encode::VoxelSearch search(job_, {.bytes = bytes});
-  EXPECT_TRUE(search.mayReach(best - 1.0));
-  EXPECT_FALSE(search.tooLarge());
-  EXPECT_FALSE(search.mayReach(best + 6.0));
-  ASSERT_TRUE(search.tooLarge());
-  EXPECT_GT(search.tooLarge()->bytes, bytes);
-  EXPECT_GE(*search.tooLarge()->psnr, best + 6.0);
-  EXPECT_TRUE(search.tooLarge()->estimated);
+  EXPECT_FALSE(search.tooLargeFor(best - 1.0));
+  const auto tooLarge = search.tooLargeFor(best + 6.0);
+  ASSERT_TRUE(tooLarge);
+  EXPECT_GT(tooLarge->bytes, bytes);
+  EXPECT_GE(*tooLarge->psnr, best + 6.0);
+  EXPECT_TRUE(tooLarge->estimated);
 }
 
 TEST_F(VoxelSearch, TakesExactVoxelsOfASizeOnlyIfTheyKeepToIt) {
