@@ -201,11 +201,10 @@ constexpr double kFewerInFrame = 0.95;
 /// Fits of fewer ellipsoids take little time, and one more or less decides.
 constexpr double kVoxelsOfAverages = 800.0, kFewestOfAverages = 200.0, kMostOfAveraging = 0.5;
 constexpr std::uint32_t kMostIterationsOfAverages = 1000;
-/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
-/// size is given up, and the share of a size that may stay unused: a hundredth.
+/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, and the fits after which a size is given
+/// up.
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
-constexpr std::uint64_t kRefillDivisor = 100;
 /// Limits of the loss by rounding for a judge, dB over the box.
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
@@ -755,8 +754,8 @@ Conversion EllipsoidSearch::smallestOrBest() {
   return std::move(*smallest);
 }
 
-/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger or smaller
-/// than those of the attempt before; the bytes are then divided again.
+/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger than those of the attempt
+/// before; the bytes are then divided again.
 /// \return nothing if the other sections take all bytes
 std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
   for (int n = 0;; ++n) {
@@ -764,9 +763,7 @@ std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
     CompactResult now = compacted(attempt, {.bytes = *goal_.bytes - besides_});
     const std::uint64_t padding = now.grid.field.chunks.size() * (format::kAlignment - 1);
     const std::uint64_t besides = bytesOfEllipsoids(now.grid) - now.bytes + padding;
-    const bool larger = besides > besides_ + padding;
-    const bool muchSmaller = besides_ > besides + padding + *goal_.bytes / kRefillDivisor;
-    if (n > 0 || !(larger || muchSmaller)) {
+    if (n > 0 || besides <= besides_ + padding) {
       needed_ = besides_ + now.bytes;
       return now;
     }
