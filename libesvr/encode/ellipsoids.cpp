@@ -159,8 +159,8 @@ constexpr double kSteepestDbPerDoubling = 7.0;
 /// Usual growth of what is seen of tones by twice the ellipsoids, dB: smoke1 has 2.9 to 3.4, the plume of 256 3.4,
 /// hydrogen_atom 2.3 to 4.2. Of values, and of the short fits of large volumes, it is kDbPerDoubling (plume of 640: 5.4).
 constexpr double kTonedDbPerDoubling = 3.0;
-/// dB by which a fit with both signs must be better to be taken (Lab, "Signs").
-constexpr double kSignsGain = 0.25;
+/// dB by which a fit with both signs must be better to be taken (Lab, "Signs"). Terms that cancel each other need more bits.
+constexpr double kSignsGain = 0.5;
 
 // How long fits are, as shares of the iterations of a whole one: a fit that continues a short one, one that continues a
 // whole one (Lab, "Continued fits"), one that continues the frame before (Lab, "Frames that continue"), and one from seeds
@@ -595,14 +595,6 @@ void EllipsoidSearch::continueFrame() {
   attempts_ = {*draft_};
 }
 
-/// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each other
-/// need more bits, so that the PSNR alone would not do.
-double EllipsoidSearch::qualityForBytes(const Attempt& attempt) const {
-  const CompactResult compact = compacted(attempt, {.loss = rounding_.usualLoss, .quick = true});
-  const double doublings = std::log2(double(std::max<std::uint64_t>(compact.bytes, 1)));
-  return attempt.psnr - compact.loss - kDbPerDoubling * doublings;
-}
-
 /// Decides whether intensities have both signs, unless the options say so: where many voxels have an
 /// extreme value and the volume is no narrow band, another short fit with both signs is compared.
 void EllipsoidSearch::decideSigns() {
@@ -611,7 +603,7 @@ void EllipsoidSearch::decideSigns() {
   auto found = unlessCancelled([&]() -> std::optional<Attempt> {
     fit.bothSigns = true;
     Attempt both = shortFit(double(draft_->asked));
-    if (qualityForBytes(both) < qualityForBytes(*draft_) + kSignsGain) return std::nullopt;
+    if (both.psnr < draft_->psnr + kSignsGain) return std::nullopt;
     return both;
   });
   fit.bothSigns = found.has_value();

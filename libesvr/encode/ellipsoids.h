@@ -117,7 +117,6 @@ class EllipsoidSearch {
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
   [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
-  [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void learnFrom(const Attempt& other);
   void draftNearPsnr();
   void draftFirst();
