@@ -21,6 +21,16 @@ const SparseVolume& valuesOf(const Job& job) {
   return job.judge ? job.judge->values() : job.input.source;
 }
 
+std::uint64_t filledIn(const Box& box, const ConvertOptions& options) {
+  std::uint64_t count = 0;
+  const VoxelLayer* const filled = options.filled;
+  for (std::size_t b = 0; filled && b < filled->bricks.size(); ++b)
+    forEachActive(filled->active[b], [&](int v) {
+      count += box.contains(filled->origin + filled->bricks[b] * kBrickSide + voxelLocal(v));
+    });
+  return count;
+}
+
 double boxGain(const SparseVolume& volume, const ConvertOptions& options) {
   const Box box = options.fit.box.value_or(activeBox(volume));
   std::uint64_t active = 0;
@@ -28,7 +38,7 @@ double boxGain(const SparseVolume& volume, const ConvertOptions& options) {
     for (int v = 0; v < kBrickVoxels; ++v)
       active += volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v));
   if (!options.fit.box) active = activeVoxelCount(volume);
-  active -= std::min(active, options.filledVoxels);
+  active -= std::min(active, filledIn(box, options));
   const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
   return 10.0 * std::log10(std::max(share, 1.0));
 }

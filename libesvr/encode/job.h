@@ -58,6 +58,9 @@ template <class Work>
 /// The values of the input, which are not those of a job with a tone curve.
 [[nodiscard]] const SparseVolume& valuesOf(const Job& job);
 
+/// The number of voxels in a box that were filled (ConvertOptions::filled).
+[[nodiscard]] std::uint64_t filledIn(const Box& box, const ConvertOptions& options);
+
 /// dB that the PSNR over the box of a volume is above that over the active voxels in the box, without those that were
 /// filled, if all errors are at these.
 [[nodiscard]] double boxGain(const SparseVolume& volume, const ConvertOptions& options);

@@ -266,7 +266,7 @@ ToneChoice chosenByFits(ToneCurve likely, const ConvertInput& given,
   const ConvertInput input{given.descriptor, isCoarse ? coarse : given.source};
   ConvertOptions options = givenOptions;
   // The averages have the filled voxels in other places. Their values are smooth, and may count here.
-  if (isCoarse) options.filledVoxels = 0, options.filled = nullptr;
+  if (isCoarse) options.filled = nullptr;
   const Scouted with = scouted(likely, input, options, count),
                 without = scouted({}, input, options, count);
   const bool isBetter = with.forTones - without.forTones > kToneGain;

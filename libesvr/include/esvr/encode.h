@@ -163,10 +163,9 @@ struct ConvertOptions {
   /// are predicted from its voxels, and a fit continues its ellipsoids, which takes less time than a search. Where that
   /// takes many more bytes, or misses the goal, the frame is converted as if it stood alone.
   const StoredGrid* previous = nullptr;
-  /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
-  /// convertVolume() where the source has values that are not finite.
-  std::uint64_t filledVoxels = 0;
-  const VoxelLayer* filled = nullptr;  ///< their places; set with them, and null if there are none
+  /// The places of active voxels whose errors do not count, because the conversion has chosen their values; null: there are
+  /// none. It is set by convertVolume() where the source has values that are not finite.
+  const VoxelLayer* filled = nullptr;
   /// Voxels keep a part of the errors of the previous frame, if there is one. Errors that stay in
   /// their places flicker less, for a few bytes more. It is false where `previous` is another grid.
   bool keepsPastErrors = true;
