@@ -1,7 +1,7 @@
 #pragma once
 /// Rate control of ellipsoids: the steps of the four parameter streams with which a fitted grid takes the fewest bytes for
-/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid(), or
-/// Compactor where a judge measures the results.
+/// an error, or has the smallest error for its bytes. The rest of the encoder calls compactGrid(), or Compactor where a judge
+/// measures the results.
 
 #include <cstddef>
 #include <cstdint>
@@ -135,8 +135,8 @@ class RateTrials {
 /// A quality that the trials of rate control do not know.
 struct JudgedGoal {
   double quality = 0.0;  ///< dB
-  double loss =
-      1.0;  ///< about the dB that are lost by rounding, a quarter of which steps of half the size lose
+  /// About the dB that are lost by rounding, a quarter of which steps of half the size lose.
+  double loss = 1.0;
   std::function<double(CompactResult&)> judge;  ///< the quality of a result, which it may change
 };
 struct JudgedResult {

@@ -113,7 +113,7 @@ void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids
 [[nodiscard]] Ellipsoids dequantise(const QuantisedEllipsoids& q);
 
 // A grid's voxels as integer codes, exact or within a bound. A file holds such a layer if voxels
-// were chosen instead of ellipsoids (convert.h), or as a residual.
+// were chosen instead of ellipsoids (encode.h), or as a residual.
 
 /// The meaning of an integer code n.
 enum class VoxelForm {
