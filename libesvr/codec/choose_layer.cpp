@@ -25,7 +25,7 @@ namespace {
 
 /// The largest difference over brick i of `a`.
 double largestOver(const SparseVolume& a, std::size_t i, const SparseVolume& b) {
-  const auto at = findBrick(b, brickOf(a.brickCorner(i)) - brickOf(b.origin));
+  const auto at = brickWith(b, a.brickCorner(i));
   double largest = 0.0;
   for (std::size_t v = 0; v < kBrickVoxels; ++v) {
     const float other = at ? b.brickValues(*at)[v] : b.background;
@@ -52,10 +52,6 @@ double largestOver(const SparseVolume& a, const SparseVolume& b) {
 
 double largestDifference(const SparseVolume& a, const SparseVolume& b) {
   return std::max(largestOver(a, b), largestOver(b, a));
-}
-
-double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
-  return largestDifference(volume, volumeOf(layer));
 }
 
 // ---- Exact layers
@@ -174,7 +170,7 @@ VoxelLayer exactLayerOf(const SparseVolume& volume, std::vector<float> palette) 
 }
 
 std::uint64_t codedBytes(const VoxelLayer& layer) {
-  return codec::codeWithin(codec::chooseModel(layer), UINT64_MAX, layer).bytes +
+  return codec::bytesOfCodes(codec::chooseModel(layer), layer) +
          layer.palette.size() * sizeof(float);
 }
 
@@ -280,7 +276,7 @@ void clip(const Box& box, Coord corner, BrickMask& mask) {
 void keepBox(const SparseVolume& volume, const Box& box, std::vector<BrickMask>& masks) {
   const unsigned lost = kAllFaces & ~touchedFaces(volume, box, masks);
   for (const Coord voxel : boxVoxels(volume, box, lost)) {
-    const auto b = findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
+    const auto b = brickWith(volume, voxel);
     masks[*b].set(voxelOffset(localOf(voxel)));
   }
 }

@@ -1041,8 +1041,8 @@ CodedPart chooseCodes(const VoxelModel& model, const Thrift& thrift, std::uint64
   return codeUpTo(mostBytes, model, &thrift, layer);
 }
 
-CodedPart codeWithin(const VoxelModel& model, std::uint64_t mostBytes, const VoxelLayer& layer) {
-  return codeUpTo(mostBytes, model, nullptr, layer);
+std::uint64_t bytesOfCodes(const VoxelModel& model, const VoxelLayer& layer) {
+  return codeUpTo(std::numeric_limits<std::uint64_t>::max(), model, nullptr, layer).bytes;
 }
 
 }  // namespace esvr::codec

@@ -27,6 +27,11 @@ namespace esvr::codec {
 /// nothing leaves the halfs or changes its side of 0. NaN remains NaN.
 [[nodiscard]] float nearestHalf(float v);
 
+/// A layer without bricks that has the place of another one, its background and the meaning of its codes.
+[[nodiscard]] VoxelLayer headOf(const VoxelLayer& layer);
+/// Some bricks of a layer. \param bricks  their numbers, increasing
+[[nodiscard]] VoxelLayer partOf(const VoxelLayer& layer, std::span<const std::size_t> bricks);
+
 /// The value of a code of a layer. A code of the form kPalette must be in the palette.
 [[nodiscard]] float valueOfCode(const VoxelLayer& layer, std::int32_t code);
 /// The code of the value: the nearest one for kQuantised, and the exact one of values that the other
@@ -156,8 +161,7 @@ struct CodedPart {
 CodedPart chooseCodes(const VoxelModel& model, const Thrift& thrift, std::uint64_t mostBytes,
                       VoxelLayer& layer);
 
-/// The same part for the codes that the layer has.
-[[nodiscard]] CodedPart codeWithin(const VoxelModel& model, std::uint64_t mostBytes,
-                                   const VoxelLayer& layer);
+/// The bytes of the codes that a layer has.
+[[nodiscard]] std::uint64_t bytesOfCodes(const VoxelModel& model, const VoxelLayer& layer);
 
 }  // namespace esvr::codec

@@ -86,6 +86,28 @@ float nearestHalf(float v) {
   return std::copysign(std::min(rounded, kLargest), v);
 }
 
+VoxelLayer headOf(const VoxelLayer& layer) {
+  VoxelLayer head;
+  head.form = layer.form;
+  head.divisor = layer.divisor;
+  head.palette = layer.palette;
+  head.origin = layer.origin;
+  head.background = layer.background;
+  return head;
+}
+
+VoxelLayer partOf(const VoxelLayer& layer, std::span<const std::size_t> bricks) {
+  VoxelLayer part = headOf(layer);
+  for (const std::size_t b : bricks) {
+    const auto codes = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
+    part.bricks.push_back(layer.bricks[b]);
+    part.active.push_back(layer.active[b]);
+    part.vacant.push_back(layer.vacant[b]);
+    part.codes.insert(part.codes.end(), codes, codes + kBrickVoxels);
+  }
+  return part;
+}
+
 float valueOfCode(const VoxelLayer& layer, std::int32_t n) {
   switch (layer.form) {
     case VoxelForm::kQuantised:

@@ -46,15 +46,6 @@ bool isWrittenDirectly(const fs::path& path) {
   return S_ISCHR(status.st_mode) || S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode);
 }
 
-bool checkTarget(const fs::path& target, bool overwrite) {
-  struct stat status {};
-  if (::lstat(target.c_str(), &status) != 0) return false;
-  if (!S_ISREG(status.st_mode))
-    throw RuntimeFailure("cannot write " + target.string() + ": it is not a regular file");
-  if (!overwrite) throw RuntimeFailure("cannot write " + target.string() + ": it exists already");
-  return true;
-}
-
 void failAt(const char* what, const fs::path& path, int error) {
   throw RuntimeFailure(what + path.string() + ": " + std::system_category().message(error));
 }
@@ -71,6 +62,19 @@ void writeAll(int fd, std::span<const std::byte> bytes, const fs::path& path) {
   }
 }
 
+namespace {
+
+/// Refuses a target that exists (without `overwrite`) or is not a regular file. \return whether it exists
+bool checkTarget(const fs::path& target, bool overwrite) {
+  struct stat status {};
+  if (::lstat(target.c_str(), &status) != 0) return false;
+  if (!S_ISREG(status.st_mode))
+    throw RuntimeFailure("cannot write " + target.string() + ": it is not a regular file");
+  if (!overwrite) throw RuntimeFailure("cannot write " + target.string() + ": it exists already");
+  return true;
+}
+
+/// Renames a file that was flushed, and flushes the folder.
 void publishFile(const fs::path& file, const fs::path& target, bool overwrite) {
   const unsigned flags = overwrite ? 0u : unsigned(RENAME_NOREPLACE);
   if (::renameat2(AT_FDCWD, file.c_str(), AT_FDCWD, target.c_str(), flags) != 0) {
@@ -88,6 +92,8 @@ void publishFile(const fs::path& file, const fs::path& target, bool overwrite) {
   ::fsync(fd);
   ::close(fd);
 }
+
+}  // namespace
 
 // Temporary files.
 

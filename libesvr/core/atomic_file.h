@@ -110,16 +110,6 @@ class PartialFile {
   int fd_ = -1;
 };
 
-/// Refuses a target that exists (without `overwrite`) or is not a regular file.
-/// \return whether it exists
-/// \throws RuntimeFailure
-bool checkTarget(const std::filesystem::path& target, bool overwrite);
-
-/// Renames a file that was flushed, and flushes the folder.
-/// \throws RuntimeFailure  the target exists (without `overwrite`) or cannot be written
-void publishFile(const std::filesystem::path& file, const std::filesystem::path& target,
-                 bool overwrite);
-
 /// Removes this user's temporary files in a directory whose processes have ended. Errors are
 /// ignored; files that cannot be removed stay.
 void removeLeftOvers(const std::filesystem::path& directory);

@@ -311,15 +311,6 @@ std::size_t GridNames::findWhole(const std::string& wanted,
   return *place;
 }
 
-std::vector<std::string> uniqueNames(std::span<const std::string> names) {
-  return GridNames({names.begin(), names.end()}).allUnique();
-}
-
-std::size_t findGrid(std::span<const std::string> names, const std::string& wanted,
-                     const std::filesystem::path& file) {
-  return GridNames({names.begin(), names.end()}).findWhole(wanted, file);
-}
-
 std::vector<std::optional<std::size_t>> pairGrids(std::span<const GridTraits> reference,
                                                   std::span<const GridTraits> candidate) {
   std::vector<std::optional<std::size_t>> pairs(reference.size());

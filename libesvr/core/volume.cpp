@@ -115,9 +115,35 @@ std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick) {
   return std::size_t(it - volume.bricks.begin());
 }
 
-float valueAt(const SparseVolume& volume, Coord voxel) {
+std::optional<std::size_t> brickWith(const SparseVolume& volume, Coord voxel) {
   // The difference is formed in bricks, because that of two voxels may exceed 32 bits.
-  const auto b = findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
+  return findBrick(volume, brickOf(voxel) - brickOf(volume.origin));
+}
+
+std::vector<Coord> brickCorners(const SparseVolume& volume) {
+  std::vector<Coord> corners;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
+  return corners;
+}
+
+SparseVolume withBricks(const SparseVolume& volume, const std::vector<Coord>& corners) {
+  SparseVolume result;
+  result.background = volume.background;
+  result.origin = corners.empty() ? Coord{} : corners.front();
+  for (const Coord corner : corners) result.origin = minCoord(result.origin, corner);
+  for (const Coord corner : corners)
+    result.bricks.push_back(brickOf(corner) - brickOf(result.origin));
+  result.values =
+      VoxelArray<float>(corners.size() * kBrickVoxels, volume.background, memoryOf(volume));
+  result.active.resize(corners.size());
+  for (std::size_t b = 0; b < corners.size(); ++b)
+    if (const auto own = brickWith(volume, corners[b]))
+      std::ranges::copy(volume.brickValues(*own), result.brickValues(b).begin());
+  return result;
+}
+
+float valueAt(const SparseVolume& volume, Coord voxel) {
+  const auto b = brickWith(volume, voxel);
   return b ? volume.brickValues(*b)[voxelOffset(localOf(voxel))] : volume.background;
 }
 
@@ -313,27 +339,6 @@ double peakOf(const ValueRange& active, double background) {
 // Grids of vectors.
 
 namespace {
-
-/// The brick of a volume with this corner.
-std::optional<std::size_t> brickWith(const SparseVolume& volume, Coord corner) {
-  return findBrick(volume, brickOf(corner) - brickOf(volume.origin));
-}
-
-/// A volume like another one, with bricks at these corners and without active voxels.
-SparseVolume withBricks(const SparseVolume& volume, const std::vector<Coord>& corners) {
-  SparseVolume result;
-  result.background = volume.background;
-  result.origin = corners.empty() ? Coord{} : corners.front();
-  for (const Coord corner : corners) result.origin = minCoord(result.origin, corner);
-  for (const Coord corner : corners) result.bricks.push_back(brickOf(corner - result.origin));
-  result.values =
-      VoxelArray<float>(corners.size() * kBrickVoxels, volume.background, memoryOf(volume));
-  result.active.resize(corners.size());
-  for (std::size_t b = 0; b < corners.size(); ++b)
-    if (const auto own = brickWith(volume, corners[b]))
-      std::ranges::copy(volume.brickValues(*own), result.brickValues(b).begin());
-  return result;
-}
 
 float lengthOf(double x, double y, double z) { return float(std::sqrt(x * x + y * y + z * z)); }
 

@@ -4,6 +4,7 @@
 #include "esvr/convert_file.h"
 
 #include <tbb/global_control.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <atomic>
@@ -21,10 +22,58 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/bytes.h"
 
 namespace esvr {
 
-// One grid, and several at the same time.
+// ---- Equal inputs
+
+namespace {
+
+template <class Items>
+void putHash(format::ByteWriter& out, const Items& items) {
+  const XXH128_hash_t hash = XXH3_128bits(items.data(), items.size() * sizeof(items.front()));
+  for (const std::uint64_t word : {std::uint64_t(items.size()), hash.low64, hash.high64})
+    out.put(word);
+}
+
+void putVolume(format::ByteWriter& out, const SparseVolume& volume) {
+  for (const auto v : {volume.origin.x, volume.origin.y, volume.origin.z}) out.put(v);
+  out.put(volume.background);
+  putHash(out, volume.bricks);
+  putHash(out, volume.values);
+  putHash(out, volume.active);
+}
+
+/// A hash of the active voxels of a volume, whatever their values.
+InputKey activeKeyOf(const SparseVolume& volume) {
+  std::vector<Coord> corners;
+  std::vector<BrickMask> masks;
+  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
+    if (volume.active[b].count() == 0) continue;
+    corners.push_back(volume.brickCorner(b));
+    masks.push_back(volume.active[b]);
+  }
+  format::ByteWriter out;
+  putHash(out, corners);
+  putHash(out, masks);
+  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
+  return {hash.low64, hash.high64};
+}
+
+}  // namespace
+
+InputKey keyOf(const ConvertInput& input) {
+  format::ByteWriter out;
+  // The class decides whether a grid is a narrow band. A lossless goal refuses doubles.
+  out.put(std::uint8_t(input.descriptor.gridClass == GridClass::kLevelSet));
+  out.put(std::uint8_t(input.descriptor.valueType == ValueType::kDouble));
+  putVolume(out, input.source);
+  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
+  return {hash.low64, hash.high64};
+}
+
+// ---- One grid, and several at the same time
 
 namespace encode {
 
@@ -56,21 +105,22 @@ bool GridConverter::isCancelled() const {
   return token && token->cancelled();
 }
 
-void GridConverter::step(std::size_t g, const std::function<void()>& run) {
-  fit_.progress = options_.convert.fit.progress;  // that of another step may be gone
-  step({g, true, fit_, run});
-}
-
-void GridConverter::step(const GridStep& step) const {
+void GridConverter::step(std::size_t g, bool isAlone,
+                         const std::function<void(const FitOptions&)>& run) {
+  FitOptions own = fit_;
+  FitOptions& fit = isAlone ? fit_ : own;
+  fit.progress = options_.convert.fit.progress;  // that of another step may be gone
+  const std::function<void()> withOptions = [&] { run(fit); };
   if (options_.onStep)
-    options_.onStep(step);
+    options_.onStep({g, isAlone, fit, withOptions});
   else
-    step.run();
+    withOptions();
 }
 
 void GridConverter::findScales() {
   for (std::size_t g = 0; g < grids_.size(); ++g)
-    if (grids_[g].component == std::size_t{0}) step(g, [&] { findScale(g); });
+    if (grids_[g].component == std::size_t{0})
+      step(g, true, [&](const FitOptions&) { findScale(g); });
 }
 
 void GridConverter::findScale(std::size_t g) {
@@ -146,24 +196,16 @@ bool GridConverter::isAsBefore(const StoredGrid* previous, const VolumeGrid& sou
          previous->descriptor.valueType == source.descriptor.valueType;
 }
 
-GridConversion GridConverter::make(std::size_t g, const Wish& wish) {
+GridConversion GridConverter::make(std::size_t g, const Wish& wish, bool isAlone) {
   GridConversion made;
-  step(g, [&] { made = readAndConvert(g, wish, fit_); });
+  step(g, isAlone, [&](const FitOptions& fit) {
+    double secondsRead = 0.0, secondsConvert = 0.0;
+    const VolumeGrid source = addSeconds(secondsRead, [&] { return read(g); });
+    made = addSeconds(secondsConvert, [&] { return convert(g, source, wish, fit); });
+    made.secondsRead = secondsRead, made.secondsConvert = secondsConvert;
+    if (options_.onConverted) options_.onConverted(source, made);
+  });
   return made;
-}
-
-GridConversion GridConverter::makeBeside(std::size_t g) const {
-  GridConversion made;
-  stepBeside(g, [&](const FitOptions& fit) { made = readAndConvert(g, {}, fit); });
-  return made;
-}
-
-void GridConverter::stepBeside(std::size_t g,
-                               const std::function<void(const FitOptions&)>& run) const {
-  FitOptions fit = fit_;
-  fit.progress = options_.convert.fit.progress;
-  const std::function<void()> withOptions = [&] { run(fit); };
-  step({g, false, fit, withOptions});
 }
 
 std::size_t GridConverter::mostAtOnce() const {
@@ -174,57 +216,41 @@ std::size_t GridConverter::mostAtOnce() const {
   return options_.severalAtOnce ? std::min(kAtOnce, threads) : 1;
 }
 
-Conversion GridConverter::convertLike(std::size_t g, const VolumeGrid& source,
-                                      const StoredGrid& expected, const FitOptions& fit) const {
-  GridConversion made;
-  ConvertOptions options = options_.convert;
-  options.keepsPastErrors = false;  // those of another grid are not worth keeping
-  options.fit = fit;
-  convert(g, source, {.expected = &expected}, std::move(options), made);
-  return std::move(made.conversion);
-}
-
-GridConversion GridConverter::readAndConvert(std::size_t g, const Wish& wish,
-                                             const FitOptions& fit) const {
-  GridConversion made{.source = g, .convertedAs = g};
-  const VolumeGrid source = addSeconds(made.secondsRead, [&] { return read(g); });
+GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
+                                      const FitOptions& fit) const {
+  GridConversion made{.source = g, .convertedAs = g, .key = keyOf(g, source)};
   made.bricks = source.volume.brickCount();
   made.nonFiniteReplaced = source.nonFiniteReplaced;
   made.inactive = source.inactive;
-  made.key = keyOf(g, source);
-  addSeconds(made.secondsConvert, [&] {
-    ConvertOptions options = options_.convert;
-    options.fit = fit;
-    convert(g, source, wish, std::move(options), made);
-  });
-  if (options_.onConverted) options_.onConverted(source, made);
-  return made;
-}
-
-void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
-                            ConvertOptions options, GridConversion& made) const {
+  const StoredGrid* const previous = previousOf(g);
+  const GridBefore* const before = wish.expected ? nullptr : recordOf(previous);
+  if (!wish.expected && isAsBefore(previous, source, made.key)) {
+    made.asBefore = true;
+    made.conversion.grid = *previous;
+    made.conversion.compact = before->compact;
+    made.conversion.grid.descriptor = source.descriptor;
+    made.conversion.grid.reference.reset();  // it may name another grid of this file
+    return made;
+  }
+  ConvertOptions options = options_.convert;
+  options.fit = fit;
   options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
+  options.previous = wish.expected ? wish.expected : previous;
+  if (before) options.previousCompact = before->compact;
+  if (wish.expected) options.keepsPastErrors = false;  // those of another grid are not worth it
   if (scales_[g].peak) options.fit.peak = scales_[g].peak;
   if (grids_[g].component) options.measure = Measure::kValues;
   // With a size, every grid uses its own bytes for its values.
   if (!wish.bytes && needsExactSet(g, source)) options.storage.activity = Activity::kExact;
-  const StoredGrid* const previous = previousOf(g);
-  options.previous = wish.expected ? wish.expected : previous;
-  if (const GridBefore* before = recordOf(previous)) options.previousCompact = before->compact;
-  if (!wish.expected && isAsBefore(previous, source, made.key)) {
-    made.asBefore = true;
-    made.conversion.grid = *previous;
-    made.conversion.compact = options.previousCompact;
-    made.conversion.grid.descriptor = source.descriptor;
-    made.conversion.grid.reference.reset();  // it may name another grid of this file
-  } else if (options_.paper) {
-    PaperConversion byPaper = convertByPaper({source.descriptor, source.volume},
-                                             {options.fit, *options_.paper}, options.storage);
-    made.conversion = std::move(byPaper.conversion);
-    made.paper = std::move(byPaper.record);
-  } else {
-    made.conversion = convertVolume({source.descriptor, source.volume}, options);
+  const ConvertInput input{source.descriptor, source.volume};
+  if (!options_.paper) {
+    made.conversion = convertVolume(input, options);
+    return made;
   }
+  PaperConversion byPaper = convertByPaper(input, {options.fit, *options_.paper}, options.storage);
+  made.conversion = std::move(byPaper.conversion);
+  made.paper = std::move(byPaper.record);
+  return made;
 }
 
 }  // namespace encode
@@ -246,10 +272,8 @@ struct Twin {
   double secondsRead = 0.0;
 };
 
-/// The twins by their index.
 using Twins = std::map<std::size_t, Twin>;
 
-/// True if another grid may have the same voxels.
 bool mayHaveTwin(const std::vector<GridSource>& grids, const GridSource& grid) {
   return std::ranges::count_if(grids, [&](const GridSource& other) {
            return grid.activeVoxels == other.activeVoxels && grid.activeBox == other.activeBox;
@@ -264,7 +288,8 @@ Twins findTwins(const std::vector<GridSource>& grids, GridConverter& converter) 
   for (std::size_t g = 0; g < grids.size() && !converter.isCancelled(); ++g) {
     if (!mayHaveTwin(grids, grids[g])) continue;
     VolumeGrid grid;
-    const double seconds = secondsOf([&] { converter.step(g, [&] { grid = converter.read(g); }); });
+    const double seconds = secondsOf(
+        [&] { converter.step(g, true, [&](const FitOptions&) { grid = converter.read(g); }); });
     const SourceKey key = converter.keyOf(g, grid);
     const auto [first, isNew] = firstBy.emplace(key, g);
     if (!isNew)
@@ -320,7 +345,6 @@ std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size)
   throw UsageError(text + "; the size allows " + std::to_string(size));
 }
 
-/// Subtracts without passing 0.
 std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
 
 /// The bytes that grids were found to need, by their indices.
@@ -438,7 +462,6 @@ class ByteShares {
     return encodeEsvr(file).size() + kPadding - encodeEsvr(records_).size();
   }
 
-  /// Bytes of a converted grid with its twins.
   [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored,
                                              const StoredGrid* previous) {
     const std::uint64_t bytes = bytesInFrame(stored, previous);
@@ -509,7 +532,7 @@ class GridsConversion {
       if (!twins_.contains(g) && source_.grids[g].activeVoxels <= kMostActive) small.push_back(g);
     encode::forEachAtOnce(small.size(), converter_.mostAtOnce(), [&](std::size_t i) {
       try {
-        made_[small[i]] = converter_.makeBeside(small[i]);
+        made_[small[i]] = converter_.make(small[i], {}, false);
       } catch (const DeviceError&) {  // it is converted again where another device can take over
       } catch (const Cancelled&) {
       }
@@ -567,7 +590,7 @@ class GridsConversion {
     if (takeEarlier(g, shares)) return;
     std::optional<std::uint64_t> bytes = shares.of(g);
     if (bytes) *bytes += shares.saved();
-    GridConversion grid = converter_.make(g, {.bytes = bytes});
+    GridConversion grid = converter_.make(g, {.bytes = bytes}, true);
     const auto excessOf = [&]() -> std::uint64_t {
       const BestSoFar completion;
       // No grid follows an interrupted one.
@@ -577,7 +600,7 @@ class GridsConversion {
     };
     while (const std::uint64_t excess = excessOf()) {
       bytes = less(*bytes, excess);
-      grid = converter_.make(g, {.bytes = bytes});
+      grid = converter_.make(g, {.bytes = bytes}, true);
     }
     made_[g] = std::move(grid);
   } catch (const Cancelled&) {  // before it had a result
@@ -625,7 +648,6 @@ std::vector<StoredVector> vectorsOf(const std::vector<GridSource>& sources,
   return vectors;
 }
 
-/// Bytes that a vector adds to a file.
 std::uint64_t bytesOfVector(const std::vector<GridConversion>& grids, const StoredVector& vector) {
   std::vector<StoredGrid> components;
   for (std::size_t c = 0; c < kComponents; ++c)

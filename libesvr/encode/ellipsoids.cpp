@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "encode/rate_control.h"
-#include "encode/root_search.h"
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -17,79 +15,12 @@
 
 namespace esvr::encode {
 
-// ---- What a job says
+namespace {
 
-bool isCancelled(const Job& job) {
-  const CancelToken* cancel = job.options.fit.cancel;
-  return cancel && cancel->cancelled();
-}
+/// Share of the active voxels with an extreme value from which on a volume saturates.
+constexpr double kSaturatedShare = 0.05;
 
-const SparseVolume& valuesOf(const Job& job) {
-  return job.judge ? job.judge->values() : job.input.source;
-}
-
-double boxGain(const SparseVolume& volume, const ConvertOptions& options) {
-  const Box box = options.fit.box.value_or(activeBox(volume));
-  std::uint64_t active = 0;
-  for (std::size_t b = 0; options.fit.box && b < volume.brickCount(); ++b)
-    for (int v = 0; v < kBrickVoxels; ++v)
-      active += volume.active[b].test(v) && box.contains(volume.brickCorner(b) + voxelLocal(v));
-  if (!options.fit.box) active = activeVoxelCount(volume);
-  active -= std::min(active, options.filledVoxels);
-  const double share = box.volume() / double(std::max<std::uint64_t>(active, 1));
-  return 10.0 * std::log10(std::max(share, 1.0));
-}
-
-bool isToned(const Job& job) { return job.judge && job.judge->tone().isOn(); }
-
-bool seesPictures(const Job& job) { return job.judge && job.judge->seesPictures(); }
-
-double psnrOf(const Job& job, SparseVolume volume) {
-  if (job.judge) return (*job.judge)(std::move(volume)).quality;
-  forgiveFilled(job.input.source, job.options.filled, volume);
-  return psnrOverBox(job.input.source, volume,
-                     {.box = job.options.fit.box, .peak = job.options.fit.peak});
-}
-
-double psnrOf(const Job& job, const StoredGrid& grid) {
-  return psnrOf(job, decodeGrid(grid, {.memory = memoryOf(job.input.source)}));
-}
-
-Representation representationOf(const Job& job) {
-  if (job.options.storage.form == Storage::kFloat32) return Representation::kEllipsoids;
-  return job.options.representation;
-}
-
-double effortFactor(int effort) {
-  constexpr double kStep = 1.6;
-  return std::pow(kStep, effort - kUsualEffort);
-}
-
-Plan planOf(const Job& job) {
-  const Tuning& tuning = kTuning;
-  const int effort = job.options.effort;
-  const double wanted = plannedIterations(job.options.fit);
-  const SparseVolume& fitted = job.averages ? *job.averages : job.input.source;
-  const double bricks = double(std::max<std::size_t>(fitted.brickCount(), 1));
-  const bool onGpu = job.options.fit.device.kind == DeviceKind::kCuda;
-  const double shortest = std::min<double>(tuning.leastShortIterations, wanted);
-  const double inTime = onGpu ? wanted : wanted * tuning.bricksOfWholeFit / bricks;
-  const double inAMinute = std::max(tuning.leastWholeShare * wanted, shortest) *
-                           std::min(1.0, tuning.bricksInAMinute / bricks);
-  const double affordable = std::max(inTime, inAMinute);
-  const double most = std::max(effortFactor(effort), 1.0),
-               least = std::min(effortFactor(effort), 1.0);
-  const double usual = std::min(wanted, most * affordable);
-  Plan plan;
-  plan.fitsInTime = effort > kLeastEffort && usual >= shortest;
-  plan.wholeIterations = std::uint32_t(std::ceil(std::max({least * usual, shortest, 1.0})));
-  plan.shortIterations = std::min(plan.wholeIterations,
-                                  std::clamp(plan.wholeIterations / 4, tuning.leastShortIterations,
-                                             tuning.mostShortIterations));
-  plan.improves = inTime >= inAMinute || effort > kUsualEffort;
-  plan.wholeFits = job.options.fit.preset == Preset::kHigh ? 3 : 2;
-  return plan;
-}
+}  // namespace
 
 bool saturates(const SparseVolume& volume) {
   const ValueRange range = activeRange(volume);
@@ -106,7 +37,7 @@ bool saturates(const SparseVolume& volume) {
         return count;
       },
       std::plus<>());
-  return double(extreme) >= kTuning.saturatedShare * double(activeVoxelCount(volume));
+  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
 }
 
 // ---- The stored grid of a fit
@@ -213,6 +144,36 @@ std::uint64_t bytesOfEllipsoids(const StoredGrid& grid) {
 
 namespace {
 
+// How ellipsoids grow with their number. "Lab" refers to docs/lab-notes.md.
+
+/// Active voxels per ellipsoid of the first guess for a PSNR.
+constexpr double kVoxelsOfFirstGuess = 35.0;
+/// The price of an ellipsoid in a short fit relative to that in a whole one.
+constexpr double kShortFitPrice = 0.94;
+/// PSNR of a whole fit of 400 iterations less that of a short one of 100, dB: smoke1 and wdas have 1.3 to 1.6. Where many
+/// voxels saturate it is 5 to 6 (dragon, aneurism), since a clamped voxel has no gradient. Of tones, smoke1 has 0.4 to 0.9,
+/// judged by what is seen.
+constexpr double kShortFitBehind = 1.6, kShortFitBehindSaturated = 5.0, kTonedShortFitBehind = 0.8;
+/// The steepest growth of the PSNR by twice the ellipsoids, dB (aneurism has 6.7).
+constexpr double kSteepestDbPerDoubling = 7.0;
+/// Usual growth of what is seen of tones by twice the ellipsoids, dB: smoke1 has 2.9 to 3.4, the plume of 256 3.4,
+/// hydrogen_atom 2.3 to 4.2. Of values, and of the short fits of large volumes, it is kDbPerDoubling (plume of 640: 5.4).
+constexpr double kTonedDbPerDoubling = 3.0;
+/// dB by which a fit with both signs must be better to be taken (Lab, "Signs"). Terms that cancel each other need more bits.
+constexpr double kSignsGain = 0.5;
+
+// How long fits are, as shares of the iterations of a whole one: a fit that continues a short one, one that continues a
+// whole one (Lab, "Continued fits"), one that continues the frame before (Lab, "Frames that continue"), and one from seeds
+// for a size, unless many voxels saturate.
+constexpr double kContinuedShare = 0.4, kContinuedWholeShare = 0.15, kContinuedFrameShare = 0.3,
+                 kSizedShare = 0.6;
+
+/// Of values (Lab, "More ellipsoids or more bits"), and of tones: smoke1 of 25 KB has 34.8 dB of what is
+/// seen with these, and 34.5 with those of values.
+constexpr Rounding kRounding{0.9, 2.5, 1.0}, kTonedRounding{0.5, 1.2, 1.65};
+
+// Where a search goes.
+
 /// A fit continues an earlier one if it has 0.85 to 1.8 times the ellipsoids of that. Where more are dropped, a fit from
 /// seeds is better (dragon, 0.6 times as many: 49.4 dB, and 47.3 dB continued). With 1.5 instead of 1.8, more short fits
 /// are made (Lab, "Where a search goes").
@@ -224,7 +185,7 @@ constexpr double kGrownFrom = 0.9;
 /// fits are made to come that near.
 constexpr double kNear = kMostGrowth * kGrownFrom;
 constexpr int kMostDrafts = 3;
-/// Whole fits of ellipsoids that take at most half of Tuning::bytesOfWholeFit, each of which has at most half of the iterations.
+/// Whole fits of ellipsoids that take at most half of kBytesOfWholeFit, each of which has at most half of the iterations.
 constexpr int kMostSmallFits = 4;
 /// Largest number of ellipsoids of the first of them. Where it is farther from the PSNR than kFar times its number of
 /// ellipsoids, one with as many times fewer shows the slope.
@@ -238,19 +199,12 @@ constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
 /// Fits of fewer ellipsoids take little time, and one more or less decides.
 constexpr double kVoxelsOfAverages = 800.0, kFewestOfAverages = 200.0, kMostOfAveraging = 0.5;
 constexpr std::uint32_t kMostIterationsOfAverages = 1000;
-/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, the fits after which a
-/// size is given up, and the share of a size that may stay unused: a hundredth.
+/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, and the fits after which a size is given
+/// up.
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
-constexpr std::uint64_t kRefillDivisor = 100;
-/// Limits of the loss by rounding for a judge, dB over the box; the octaves by which the steps may then be scaled, and
-/// those that make no difference; the dB by which a rounded grid may exceed a PSNR, and the times that a fit is rounded
-/// for it.
-constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0, kMostFiner = 3.0,
-                 kNarrowestFiner = 0.02, kPsnrSpare = 0.08;
-constexpr int kMostRoundings = 4;
-/// A judge's PSNR is that of scaled sums, from which that of a reader, who decodes, differs by a few 1e-6 dB.
-constexpr double kJudgedMargin = 1e-5;
+/// Limits of the loss by rounding for a judge, dB over the box.
+constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
 constexpr double kMostBehind = 2.5;
 /// Bounds on the slope between two short fits, whose PSNR is known to a few tenths of a dB.
@@ -292,25 +246,25 @@ double psnrFor(const std::vector<FitPoint>& fits, double count, double slope) {
 
 }  // namespace
 
-EllipsoidSearch::EllipsoidSearch(const Job& job, const Goal& goal)
+EllipsoidSearch::EllipsoidSearch(const Job& job, const Aim& goal, const StoredGrid* before)
     : options_(job.options),
       job_{job.input, options_, job.judge, job.scout},
       goal_(goal),
+      before_(before),
       plan_(planOf(job)),
       compact_(job.options.storage.form == Storage::kCompact),
       saturates_(saturates(job.input.source)),
-      rounding_(isToned(job) ? kTuning.tonedRounding : kTuning.rounding),
+      rounding_(isToned(job) ? kTonedRounding : kRounding),
       margin_(compact_ ? compactMargin(rounding_.usualLoss * rounding_.factor) : kFloat32Margin),
-      slope_(isToned(job_) && plan_.improves ? kTuning.tonedDbPerDoubling : kDbPerDoubling),
+      slope_(isToned(job_) && plan_.improves ? kTonedDbPerDoubling : kDbPerDoubling),
       maxCount_(activeVoxelCount(job.input.source)) {
   if (goal.psnr && options_.fit.count)
     maxCount_ = std::min<std::uint64_t>(maxCount_, *options_.fit.count);
-  if (goal.below) stayBelow(*goal.below);
 }
 
 void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
-  goal_.below = bytes;
-  maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kTuning.leastBytesEach) + 1);
+  below_ = bytes;
+  maxCount_ = std::min(maxCount_, std::uint64_t(double(bytes) / kLeastBytesEach) + 1);
 }
 
 namespace {
@@ -360,8 +314,8 @@ Attempt attempted(const Job& job, const FitOptions& options) {
 /// The number of ellipsoids of the first short fit for a size, and for a PSNR.
 double firstCount(const Job& job) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
-    return kGrownFrom * double(size->bytes) / kTuning.usualBytesEach;
-  return std::min(double(activeVoxelCount(job.input.source)) / kTuning.voxelsOfFirstGuess,
+    return kGrownFrom * double(size->bytes) / kUsualBytesEach;
+  return std::min(double(activeVoxelCount(job.input.source)) / kVoxelsOfFirstGuess,
                   kMostOfFirstDraft);
 }
 
@@ -411,12 +365,11 @@ Attempt EllipsoidSearch::wholeFit(double count) const {
   const Attempt* from = startFor(double(*options.count));
   const bool isShort = from && draft_ && from == &*draft_;
   if (goal_.bytes && (!from || isShort)) {
-    if (!saturates_) options.iterations = shareOfWhole(kTuning.sizedShare);
+    if (!saturates_) options.iterations = shareOfWhole(kSizedShare);
     return attempted(job_, options);
   }
   if (!from) return attempted(job_, options);
-  return continued(from->grid, count,
-                   isShort ? kTuning.continuedShare : kTuning.continuedWholeShare);
+  return continued(from->grid, count, isShort ? kContinuedShare : kContinuedWholeShare);
 }
 
 /// A fit that continues other ellipsoids. It adds some, or drops the weakest first.
@@ -434,53 +387,38 @@ CompactResult EllipsoidSearch::compacted(const Attempt& attempt, CompactOptions 
   return compactedTo(job_, attempt.grid, attempt.fit, target);
 }
 
-/// The steps of the frame before, made finer or coarser for a loss in dB. The error that they add grows with the square of
-/// the steps.
-QuantiserSteps EllipsoidSearch::stepsOfFrameBefore(double loss) const {
+/// The steps of the frame before, made finer or coarser for a loss in dB; nothing if they are not known. The error that they
+/// add grows with the square of the steps.
+std::optional<QuantiserSteps> EllipsoidSearch::stepsOfFrameBefore(double loss) const {
+  const auto& before = options_.previousCompact;
+  if (!before_ || !before) return std::nullopt;
   const auto added = [](double dB) {
     return std::pow(10.0, std::max(dB, kLeastLoss) / 10.0) - 1.0;
   };
-  const CompactRecord& before = *options_.previousCompact;
-  return finer(before.steps, 0.5 * std::log2(added(before.loss) / added(loss)));
+  return finer(before->steps, 0.5 * std::log2(added(before->loss) / added(loss)));
 }
 
-/// The smallest conversion of an attempt with the PSNR of the goal. Rate control knows the error over the
-/// box alone, by which it finds the proportions of the steps, unless the frame before has them. A judge's PSNR loses about
-/// as many dB, which is measured; where it misses the goal or exceeds it, all steps are scaled.
+/// The smallest conversion of an attempt with the PSNR of the goal. A judge's PSNR loses about as many dB as that over the
+/// box, which rate control knows, and is measured.
 Conversion EllipsoidSearch::storedForPsnr(Attempt attempt) {
   if (!job_.judge || !compact_)
     return storedAs(job_, std::move(attempt.fit), std::move(attempt.grid), {.psnr = goal_.psnr});
   const double loss =
       std::clamp((attempt.psnr - *goal_.psnr) / rounding_.factor, kLeastLoss, kMostRoundingLoss);
-  std::optional<Compactor> compactor;
-  const auto rounded = [&](const QuantiserSteps* steps) {
-    return roundedBy(job_, attempt.grid, attempt.fit, {.loss = loss},
-                     [&](const CompactOptions& options) {
-                       if (!compactor) compactor.emplace(attempt.grid, job_.input.source, options);
-                       return steps ? compactor->at(*steps) : compactor->nearLoss();
-                     });
-  };
-  std::optional<QuantiserSteps> known;
-  if (goal_.before && options_.previousCompact) known = stepsOfFrameBefore(loss);
-  CompactResult made = rounded(known ? &*known : nullptr);
-  const QuantiserSteps steps = made.steps;
-  // The loss, dB, falls by a factor of 4 for an octave.
-  RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, *goal_.psnr + 0.5 * kPsnrSpare,
-                    std::log(4.0) * rounding_.factor * loss, 0.0);
-  std::optional<CompactResult> best;
-  for (int trial = 1;; ++trial) {
-    const double psnr = completed(attempt, made), over = psnr - *goal_.psnr - kJudgedMargin;
-    const double bestOver = best ? *reached_ - *goal_.psnr - kJudgedMargin : -HUGE_VAL;
-    const bool isBetter = bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver;
-    if (isBetter) best = std::move(made), reached_ = psnr;
-    if ((over >= 0.0 && over <= kPsnrSpare) || attempt.cancelled() || isCancelled(job_)) break;
-    search.learn(psnr);
-    if (trial == kMostRoundings || search.ended()) break;
-    const QuantiserSteps next = finer(steps, search.next());
-    made = rounded(&next);
-  }
+  reached_.reset();
+  CompactResult made = roundedBy(
+      job_, attempt.grid, attempt.fit, {.loss = loss}, [&](const CompactOptions& options) {
+        Compactor compactor(attempt.grid, job_.input.source, options);
+        auto found = compactor.toQuality(
+            {*goal_.psnr, rounding_.factor * loss,
+             [&](CompactResult& rounded) { return completed(attempt, rounded); },
+             stepsOfFrameBefore(loss)});
+        reached_ = found.quality;
+        return std::move(found.result);
+      });
+  if (!reached_) reached_ = completed(attempt, made);
   if (*reached_ < *goal_.psnr && !attempt.cancelled()) attempt.fit.end = FitEnd::kPsnrMissed;
-  return conversionOf(std::move(attempt.fit), std::move(*best));
+  return conversionOf(std::move(attempt.fit), std::move(made));
 }
 
 /// The quality that an attempt has after rounding. A grid that is seen gets the mass of its source.
@@ -496,17 +434,16 @@ double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded
 
 /// Quality of a whole fit less that of a short one, dB.
 double EllipsoidSearch::behind() const {
-  if (goal_.before) return 0.0;
+  if (before_) return 0.0;
   const double whole = plan_.wholeIterations, brief = plan_.shortIterations;
   if (!isToned(job_)) {
-    const double usual = saturates_ ? kTuning.shortFitBehindSaturated : kTuning.shortFitBehind;
+    const double usual = saturates_ ? kShortFitBehindSaturated : kShortFitBehind;
     return usual * std::clamp(0.5 * std::log2(whole / brief), 0.0, 1.0);
   }
   // The error that iterations leave falls with their number: the plume of 256 has 168 and 42 of them.
   const auto gain = [](double from, double to) { return 1.0 / from - 1.0 / to; };
-  const double most = kTuning.mostShortIterations;
-  return kTuning.tonedShortFitBehind *
-         std::min(gain(brief, whole) / gain(most, 4.0 * most), kMostBehind);
+  const double most = kMostShortIterations;
+  return kTonedShortFitBehind * std::min(gain(brief, whole) / gain(most, 4.0 * most), kMostBehind);
 }
 
 double EllipsoidSearch::aim() const { return *goal_.psnr + margin_.aim; }
@@ -542,8 +479,8 @@ void EllipsoidSearch::learnFrom(const Attempt& other) {
   const double doublings = std::log2(countOf(other) / countOf(*draft_));
   if (std::abs(doublings) < std::log2(kMinSlopeRatio)) return;
   slopeIsKnown_ = true;
-  slope_ = std::clamp((other.psnr - draft_->psnr) / doublings, kMinSlope,
-                      2.0 * kTuning.steepestDbPerDoubling);
+  slope_ =
+      std::clamp((other.psnr - draft_->psnr) / doublings, kMinSlope, 2.0 * kSteepestDbPerDoubling);
 }
 
 /// The number of ellipsoids of the first short fit for a PSNR.
@@ -555,7 +492,7 @@ double EllipsoidSearch::firstCountForPsnr() const {
   }
   const double guess = firstCount(job_);
   // Where ellipsoids win, they usually take about half of the bytes.
-  return goal_.below ? std::min(guess, 0.5 * double(*goal_.below) / kTuning.usualBytesEach) : guess;
+  return below_ ? std::min(guess, 0.5 * double(*below_) / kUsualBytesEach) : guess;
 }
 
 // Large ellipsoids are fitted to averages, whose iterations take a seventh of the time. Iterations of all voxels after
@@ -631,13 +568,13 @@ void EllipsoidSearch::draftNearPsnr() {
       return;
     }
     if (drafts == kMostDrafts) return;
-    isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
+    isTooLarge_ = !mayStayBelow(below_.value_or(UINT64_MAX));
     if (draft_->cancelled() || isTooLarge_) return;
     if (!slopeIsKnown_ && !isToned(job_) && next() > kFar * countOf(*draft_)) {
       const auto fewer = another(countOf(*draft_) / kFar);
       if (!fewer) return;
       learnFrom(*fewer);
-      isTooLarge_ = !mayStayBelow(goal_.below.value_or(UINT64_MAX));
+      isTooLarge_ = !mayStayBelow(below_.value_or(UINT64_MAX));
       if (isTooLarge_) return;
     }
     const double count = next(), ratio = count / countOf(*draft_);
@@ -661,14 +598,14 @@ double EllipsoidSearch::countOfFrame(const StoredGrid& before) const {
 
 /// A fit that continues the ellipsoids of the frame before takes the place of the short ones, and is the first whole one.
 void EllipsoidSearch::continueFrame() {
-  const StoredGrid& before = *goal_.before;
+  const StoredGrid& before = *before_;
   const auto hasNegative = [](const Chunk& chunk) {
     return std::ranges::any_of(chunk.ellipsoids.intensity, [](float i) { return i < 0.0f; });
   };
   if (!options_.fit.bothSigns)
     options_.fit.bothSigns = std::ranges::any_of(before.field.chunks, hasNegative);
   const double bytes = double(bytesOfEllipsoids(before));
-  const double share = kTuning.continuedFrameShare * std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  const double share = kContinuedFrameShare * std::min(1.0, bytes / kBytesOfWholeFit);
   const double count = countOfFrame(before);
   if (mayFitAverages(count)) fitAverages();
   draft_ = continued(before, count, share);
@@ -681,14 +618,6 @@ void EllipsoidSearch::continueFrame() {
   attempts_ = {*draft_};
 }
 
-/// The PSNR of an attempt if it is quantised to as many bytes as others. Terms that cancel each other
-/// need more bits, so that the PSNR alone would not do.
-double EllipsoidSearch::qualityForBytes(const Attempt& attempt) const {
-  const CompactResult compact = compacted(attempt, {.loss = rounding_.usualLoss, .quick = true});
-  const double doublings = std::log2(double(std::max<std::uint64_t>(compact.bytes, 1)));
-  return attempt.psnr - compact.loss - kDbPerDoubling * doublings;
-}
-
 /// Decides whether intensities have both signs, unless the options say so: where many voxels have an
 /// extreme value and the volume is no narrow band, another short fit with both signs is compared.
 void EllipsoidSearch::decideSigns() {
@@ -697,7 +626,7 @@ void EllipsoidSearch::decideSigns() {
   auto found = unlessCancelled([&]() -> std::optional<Attempt> {
     fit.bothSigns = true;
     Attempt both = shortFit(double(draft_->asked));
-    if (qualityForBytes(both) < qualityForBytes(*draft_) + kTuning.signsGain) return std::nullopt;
+    if (both.psnr < draft_->psnr + kSignsGain) return std::nullopt;
     return both;
   });
   fit.bothSigns = found.has_value();
@@ -710,20 +639,19 @@ void EllipsoidSearch::decideSigns() {
 /// ellipsoids of a size follows from it. In a frame, the price is that of the frame before.
 void EllipsoidSearch::forecast() {
   if (draft_->cancelled() || !compact_) return;
-  if (goal_.before) {
-    price_ =
-        double(bytesOfEllipsoids(*goal_.before)) / double(goal_.before->field.ellipsoidCount());
+  if (before_) {
+    price_ = double(bytesOfEllipsoids(*before_)) / double(before_->field.ellipsoidCount());
   } else {
     const bool isQuick = goal_.psnr.has_value();
     const CompactResult compact =
         compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
-    price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kTuning.shortFitPrice;
+    price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kShortFitPrice;
     const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
     besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
   }
   const double bytes =
       goal_.psnr ? price_ * countFor(drafted_, aim() - behind(), slope_) : double(*goal_.bytes);
-  const double share = std::min(1.0, bytes / kTuning.bytesOfWholeFit);
+  const double share = std::min(1.0, bytes / kBytesOfWholeFit);
   // Of a few ellipsoids, one more or less may miss a PSNR (hydrogen_atom with 40 dB), and fits are short.
   if (share <= 0.5) plan_.wholeFits = std::max(plan_.wholeFits, kMostSmallFits);
   plan_.wholeIterations = std::max(std::min(plan_.shortIterations, plan_.wholeIterations),
@@ -736,13 +664,13 @@ void EllipsoidSearch::forecast() {
 void EllipsoidSearch::draft(const CancelToken* cancel) {
   const CancelToken* own = options_.fit.cancel;
   if (cancel) options_.fit.cancel = cancel;
-  if (goal_.before)
+  if (before_)
     continueFrame();
   else if (goal_.psnr)
     draftNearPsnr();
   else
     draft_ = shortFit(firstCount(job_));
-  if (!goal_.before && (!goal_.below || mayStayBelow(*goal_.below))) decideSigns();
+  if (!before_ && (!below_ || mayStayBelow(*below_))) decideSigns();
   forecast();
   options_.fit.cancel = own;
 }
@@ -753,15 +681,15 @@ double EllipsoidSearch::expectedPsnr() const {
 }
 
 bool EllipsoidSearch::mayReach(double psnr) const {
-  return draft_->cancelled() || expectedPsnr() + kTuning.uncertainty >= psnr;
+  return draft_->cancelled() || expectedPsnr() + kUncertainty >= psnr;
 }
 
 bool EllipsoidSearch::mayStayBelow(std::uint64_t bytes) const {
   if (draft_->cancelled()) return true;
   if (isTooLarge_) return false;
-  const double least = aim() - behind() - kTuning.uncertainty;
+  const double least = aim() - behind() - kUncertainty;
   const bool isKnown = slopeIsKnown_ || expectedBytes_ > 0;
-  const double fewest = least > draft_->psnr ? kTuning.steepestDbPerDoubling : kMinSlope;
+  const double fewest = least > draft_->psnr ? kSteepestDbPerDoubling : kMinSlope;
   const double count = countFor(drafted_, least, isKnown ? slope_ : fewest);
   return count <= double(maxCount_) && double(besides_) + price_ * count <= double(bytes);
 }
@@ -845,8 +773,8 @@ Conversion EllipsoidSearch::smallestOrBest() {
   return std::move(*smallest);
 }
 
-/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger or smaller
-/// than those of the attempt before; the bytes are then divided again.
+/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger than those of the attempt
+/// before; the bytes are then divided again.
 /// \return nothing if the other sections take all bytes
 std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
   for (int n = 0;; ++n) {
@@ -854,9 +782,7 @@ std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
     CompactResult now = compacted(attempt, {.bytes = *goal_.bytes - besides_});
     const std::uint64_t padding = now.grid.field.chunks.size() * (format::kAlignment - 1);
     const std::uint64_t besides = bytesOfEllipsoids(now.grid) - now.bytes + padding;
-    const bool larger = besides > besides_ + padding;
-    const bool muchSmaller = besides_ > besides + padding + *goal_.bytes / kRefillDivisor;
-    if (n > 0 || !(larger || muchSmaller)) {
+    if (n > 0 || besides <= besides_ + padding) {
       needed_ = besides_ + now.bytes;
       return now;
     }

@@ -7,9 +7,23 @@
 #include <vector>
 
 #include "encode/job.h"
-#include "encode/tuning.h"
+#include "encode/rate_control.h"
 
 namespace esvr::encode {
+
+/// Bytes that an ellipsoid takes usually (by default 6.7 in smoke1 and plume_256, 8.1 in dragon) and at least.
+inline constexpr double kUsualBytesEach = 7.5, kLeastBytesEach = 4.5;
+/// dB by which a whole fit may exceed its forecast (dragon, neuron_rp140212).
+inline constexpr double kUncertainty = 1.0;
+/// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the bytes of a short one,
+/// which for fewer bytes is worth less time in proportion (hydrogen_atom: 560 bytes in 12 CPU seconds with all iterations).
+inline constexpr double kBytesOfWholeFit = 4096.0;
+
+/// The loss by quantising, dB of PSNR over the box, at which further bytes gain as much in more ellipsoids as in
+/// more bits, the one above which fewer ellipsoids are better, and the loss of quality for each dB of it.
+struct Rounding {
+  double usualLoss, mostLoss, factor;
+};
 
 /// A fit, and its grid in float32.
 struct Attempt {
@@ -62,22 +76,13 @@ struct Margin {
 /// of the frame before instead of making short fits.
 class EllipsoidSearch {
  public:
-  struct Goal {
-    std::optional<double> psnr{};  ///< dB over the box
-    std::optional<std::uint64_t>
-        bytes{};  ///< bytes that the grid may add to a file, without a PSNR
-    /// Bytes that the grid must stay below to be of use, with a PSNR. Fits end early where the grid
-    /// would not.
-    std::optional<std::uint64_t> below{};
-    const StoredGrid* before =
-        nullptr;  ///< the ellipsoids to continue, with a PSNR; null: there are none
-  };
-
-  EllipsoidSearch(const Job& job, const Goal& goal);
+  /// \param before  the ellipsoids to continue, with a PSNR; null: there are none
+  EllipsoidSearch(const Job& job, const Aim& goal, const StoredGrid* before = nullptr);
   EllipsoidSearch(const EllipsoidSearch&) = delete;
   EllipsoidSearch& operator=(const EllipsoidSearch&) = delete;
 
-  /// Sets Goal::below, before the short fits or after them.
+  /// Sets the bytes that a grid with a PSNR must stay below to be of use, before the short fits or after them. Fits end
+  /// early where it would not.
   void stayBelow(std::uint64_t bytes);
 
   /// Makes the short fits. \param cancel  cancels them alone; null: the job's token does
@@ -89,7 +94,7 @@ class EllipsoidSearch {
   [[nodiscard]] std::uint64_t expectedBytes() const { return expectedBytes_; }
 
   /// False if the drafts show that the grid cannot stay below a number of bytes, or, for a size, that
-  /// it cannot have a PSNR, even if it is better than expected by Tuning::uncertainty.
+  /// it cannot have a PSNR, even if it is better than expected by kUncertainty.
   [[nodiscard]] bool mayStayBelow(std::uint64_t bytes) const;
   [[nodiscard]] bool mayReach(double psnr) const;
 
@@ -112,10 +117,9 @@ class EllipsoidSearch {
   [[nodiscard]] Attempt continued(const StoredGrid& from, double count, double share) const;
   [[nodiscard]] const Attempt* startFor(double count) const;
   [[nodiscard]] CompactResult compacted(const Attempt& attempt, CompactOptions target) const;
-  [[nodiscard]] QuantiserSteps stepsOfFrameBefore(double loss) const;
+  [[nodiscard]] std::optional<QuantiserSteps> stepsOfFrameBefore(double loss) const;
   [[nodiscard]] Conversion storedForPsnr(Attempt attempt);
   [[nodiscard]] double completed(const Attempt& attempt, CompactResult& rounded) const;
-  [[nodiscard]] double qualityForBytes(const Attempt& attempt) const;
   void learnFrom(const Attempt& other);
   void draftNearPsnr();
   void draftFirst();
@@ -142,19 +146,21 @@ class EllipsoidSearch {
   ConvertOptions options_;
   SparseVolume averages_;
   Job job_;
-  Goal goal_;
+  Aim goal_;
+  const StoredGrid* before_;
+  std::optional<std::uint64_t> below_;  ///< stayBelow()
   Plan plan_;
   bool compact_, saturates_;
   Rounding rounding_;
   Margin margin_;
   double slope_;               ///< growth of the quality by twice the ellipsoids, dB
   bool slopeIsKnown_ = false;  ///< from two short fits
-  bool isTooLarge_ = false;  ///< the short fits showed that the grid cannot stay below Goal::below
+  bool isTooLarge_ = false;    ///< the short fits showed that the grid cannot stay below `below_`
   std::uint64_t maxCount_;
-  std::optional<Attempt> draft_;           ///< the last short fit
-  std::vector<FitPoint> drafted_;          ///< all of them that are like it
-  double price_ = kTuning.usualBytesEach;  ///< expected bytes of an ellipsoid
-  std::uint64_t besides_ = 0;              ///< bytes of the grid's other sections
+  std::optional<Attempt> draft_;    ///< the last short fit
+  std::vector<FitPoint> drafted_;   ///< all of them that are like it
+  double price_ = kUsualBytesEach;  ///< expected bytes of an ellipsoid
+  std::uint64_t besides_ = 0;       ///< bytes of the grid's other sections
   std::uint64_t expectedBytes_ = 0, needed_ = 0;
   std::vector<Attempt> attempts_;
   std::optional<double>

@@ -26,7 +26,6 @@ GridSource sourceOf(const std::filesystem::path& path, const GridSummary& grid, 
   return source;
 }
 
-/// A component of vectors.
 GridSource componentOf(const std::filesystem::path& path, const GridSummary& grid,
                        std::size_t place, std::size_t component, const ReadOptions& read) {
   GridSource source = sourceOf(path, grid, place, read);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "esvr/convert_file.h"
@@ -19,9 +20,6 @@ struct Wish {
   const StoredGrid* expected = nullptr;
 };
 
-/// A hash of the active voxels of a volume, whatever their values. (references.cpp)
-[[nodiscard]] InputKey activeKeyOf(const SparseVolume& volume);
-
 /// Reads and converts single grids of a file.
 class GridConverter {
  public:
@@ -30,8 +28,8 @@ class GridConverter {
 
   [[nodiscard]] bool isCancelled() const;
 
-  /// Runs a step of a conversion that is alone.
-  void step(std::size_t g, const std::function<void()>& run);
+  /// Runs a step of a conversion. \param isAlone  false: it is one of several at the same time, with options of its own
+  void step(std::size_t g, bool isAlone, const std::function<void(const FitOptions&)>& run);
 
   /// Reads vectors for the peak and the range of their components, and for their active voxels.
   void findScales();
@@ -43,15 +41,11 @@ class GridConverter {
   /// name; null if there is none.
   [[nodiscard]] const StoredGrid* previousOf(std::size_t g) const;
 
-  /// \throws Cancelled  the conversion has no result
-  [[nodiscard]] GridConversion make(std::size_t g, const Wish& wish);
-  /// The same on one of several threads, with options of its own.
-  [[nodiscard]] GridConversion makeBeside(std::size_t g) const;
-  /// The grid that is made from `source` for another grid that it is expected to be like.
-  [[nodiscard]] Conversion convertLike(std::size_t g, const VolumeGrid& source,
-                                       const StoredGrid& expected, const FitOptions& fit) const;
-  /// Runs a step on one of several threads, with options of its own.
-  void stepBeside(std::size_t g, const std::function<void(const FitOptions&)>& run) const;
+  /// Reads a grid and converts it in a step. \throws Cancelled  the conversion has no result
+  [[nodiscard]] GridConversion make(std::size_t g, const Wish& wish, bool isAlone);
+  /// Converts a grid within a step.
+  [[nodiscard]] GridConversion convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
+                                       const FitOptions& fit) const;
   /// Number of small grids that are worked on at the same time.
   [[nodiscard]] std::size_t mostAtOnce() const;
 
@@ -68,13 +62,8 @@ class GridConverter {
     friend bool operator==(const ActiveSet&, const ActiveSet&) = default;
   };
 
-  void step(const GridStep& step) const;
   void findScale(std::size_t g);
   [[nodiscard]] Goal resolvedGoal(std::size_t g) const;
-  [[nodiscard]] GridConversion readAndConvert(std::size_t g, const Wish& wish,
-                                              const FitOptions& fit) const;
-  void convert(std::size_t g, const VolumeGrid& source, const Wish& wish, ConvertOptions options,
-               GridConversion& made) const;
   [[nodiscard]] bool needsExactSet(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] const GridBefore* recordOf(const StoredGrid* previous) const;
   [[nodiscard]] bool isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
@@ -92,12 +81,29 @@ class GridConverter {
 void forEachAtOnce(std::size_t count, std::size_t threads,
                    const std::function<void(std::size_t)>& body);
 
+// What follows is in share_grids.cpp.
+
 /// Chooses for each grid of voxels another grid of the file that its voxels refer to, where that takes fewer
 /// bytes, and gives the file the compact layout. If the goal is a PSNR or a preset, the voxels are chosen again
-/// for this coding. (share_grids.cpp)
+/// for this coding.
 void shareGrids(const FileOptions& options, GridConverter& converter, ConvertedFile& made);
 
-/// A grid without its content, of which a file has little more than the record. (share_grids.cpp)
+/// Chooses a reference for a grid of voxels. Candidates are compared on a sample of its bricks.
+/// \param grids  the grids of a file. Those of `candidates` must be before `grid`, and those among
+///               them that hold no voxels are ignored.
+/// \return the reference with which the voxels take the fewest bytes of those that were tried, the
+///         empty one among them. They may take even fewer without a reference (bytesAdded).
+[[nodiscard]] VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
+                                             std::span<const std::size_t> candidates);
+
+/// The grid that a reference names, with the values that are expected for the grid that refers to
+/// it. As ConvertOptions::previous it makes a conversion choose voxels that take few bytes with this
+/// reference.
+/// \param grid  refers to the other grid
+[[nodiscard]] StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
+                                      const VoxelReference& reference);
+
+/// A grid without its content, of which a file has little more than the record.
 [[nodiscard]] StoredGrid recordAlone(const StoredGrid& grid);
 
 }  // namespace esvr::encode

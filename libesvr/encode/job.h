@@ -13,6 +13,12 @@ namespace esvr::encode {
 
 class Judge;
 
+/// What a search is to reach: a quality in few bytes, or a size with a good quality.
+struct Aim {
+  std::optional<double> psnr{};          ///< dB, as the job measures it
+  std::optional<std::uint64_t> bytes{};  ///< that the grid may add to a file, without a PSNR
+};
+
 /// The quality, dB, of a fit for which a number of ellipsoids was wanted.
 struct FitPoint {
   double count = 0.0, psnr = 0.0;
@@ -52,6 +58,9 @@ template <class Work>
 /// The values of the input, which are not those of a job with a tone curve.
 [[nodiscard]] const SparseVolume& valuesOf(const Job& job);
 
+/// The number of voxels in a box that were filled (ConvertOptions::filled).
+[[nodiscard]] std::uint64_t filledIn(const Box& box, const ConvertOptions& options);
+
 /// dB that the PSNR over the box of a volume is above that over the active voxels in the box, without those that were
 /// filled, if all errors are at these.
 [[nodiscard]] double boxGain(const SparseVolume& volume, const ConvertOptions& options);
@@ -72,6 +81,9 @@ void forgiveFilled(const SparseVolume& source, const VoxelLayer* filled, SparseV
 
 /// The representation of a job. Float32 storage is a form of ellipsoids.
 [[nodiscard]] Representation representationOf(const Job& job);
+
+/// The most iterations of a short fit. With 100, fit/tuning.h makes the most of them.
+inline constexpr std::uint32_t kMostShortIterations = 100;
 
 /// How much work a conversion may do, by its effort, its device and its size. It does not depend on
 /// measured times, so that the result does not either.

@@ -28,7 +28,6 @@ namespace esvr::encode {
 
 namespace {
 
-/// A voxel of a volume.
 struct VoxelPlace {
   std::uint32_t brick = 0;
   std::int32_t v = 0;
@@ -177,20 +176,9 @@ SparseVolume withFilledVoxels(const SparseVolume& volume, ValueType valueType, F
 
 namespace {
 
-/// True if the values of a grid are stored as they are.
 bool storesValues(const Goal& goal) {
   const auto* within = std::get_if<BoundGoal>(&goal);
   return std::holds_alternative<LosslessGoal>(goal) || (within && within->bound == 0.0);
-}
-
-/// The number of the layer's voxels in the box of the conversion.
-std::uint64_t countIn(const VoxelLayer& layer, const Box& box) {
-  std::uint64_t count = 0;
-  for (std::size_t b = 0; b < layer.bricks.size(); ++b)
-    forEachActive(layer.active[b], [&](int v) {
-      count += box.contains(layer.origin + layer.bricks[b] * kBrickSide + voxelLocal(v));
-    });
-  return count;
 }
 
 /// Takes the bytes of the voxels that are not finite from a size.
@@ -212,9 +200,8 @@ void takeBytes(const StoredGrid& kept, const ConvertOptions& options, SizeGoal& 
 /// the others, so that a PSNR over all voxels that is higher by the share of the others suffices.
 ConvertOptions adapted(const SparseVolume& source, const StoredGrid& kept, ConvertOptions options) {
   const Box box = options.fit.box.value_or(activeBox(source));
-  options.filledVoxels = countIn(*kept.nonFiniteVoxels, box);
   options.filled = &*kept.nonFiniteVoxels;
-  const double left = box.volume() - double(options.filledVoxels);
+  const double left = box.volume() - double(filledIn(box, options));
   const double gain = left > 0.0 ? 10.0 * std::log10(box.volume() / left) : 0.0;
   if (auto* psnr = std::get_if<PsnrGoal>(&options.goal)) psnr->psnr += gain;
   if (options.fit.psnr) *options.fit.psnr += gain;

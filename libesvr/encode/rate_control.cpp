@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "encode/job.h"
 #include "encode/root_search.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
@@ -101,17 +102,18 @@ std::vector<float> intensitiesOfFirstLayers(const RateTrial& trial, std::size_t 
 
 }  // namespace
 
-RateTrials::RateTrials(const StoredGrid& grid, const RateTarget& target)
+RateTrials::RateTrials(const StoredGrid& grid, const SparseVolume& source,
+                       const CompactOptions& options)
     : bricks_(grid.bricks),
-      target_{target.source, format::ruleOf(grid), target.box, bricks_,
+      target_{source, format::ruleOf(grid), options.box.value_or(activeBox(source)), bricks_,
               grid.topology != TopologyKind::kThreshold},
       sampleBricks_(sampleOfCorners(knownCorners(target_))),
-      sampleTarget_{target_.source, target_.rule, target.box, sampleBricks_, true},
-      problem_(target_, target.device),
-      sampleProblem_(sampleTarget_, target.device),
+      sampleTarget_{source, target_.rule, target_.box, sampleBricks_, true},
+      problem_(target_, options.device),
+      sampleProblem_(sampleTarget_, options.device),
       field_(grid.field),
-      quick_(target.quick),
-      peak_(target.peak ? *target.peak : peakOf(target.source)) {
+      quick_(options.quick),
+      peak_(options.peak ? *options.peak : peakOf(source)) {
   if (quick_) {
     auto intensities = intensitiesOf(field_);
     problem_.setShapes(field_);
@@ -134,7 +136,6 @@ double RateTrials::measure(const RateTrial& trial) {
   return errorOf(trial.field, intensitiesOf(trial.field)).squares;
 }
 
-/// The error of a field against the source.
 StoredError RateTrials::errorOf(const Field& field, std::span<const float> intensities) {
   problem_.setShapes(field);
   return problem_.error(intensities);
@@ -409,6 +410,20 @@ constexpr double kPsnrMargin = 5e-4, kMaxPsnrOfMargin = 80.0;
 constexpr int kMaxCorrections = 2;
 constexpr double kSmallExcess = 0.05;
 
+/// What a result may exceed a judged quality by, dB, the octaves by which the steps may be scaled for it, those that make
+/// no difference, and the results that are measured. A judge's PSNR is that of scaled sums, from which that of a
+/// reader, who decodes, differs by 1e-7 dB.
+constexpr double kQualitySpare = 0.08, kMostFiner = 3.0, kNarrowestFiner = 0.02,
+                 kJudgedMargin = 1e-5;
+constexpr int kMostJudged = 4;
+
+/// What the PSNR of a reader exceeds the wanted one by, dB.
+double excessOf(const StoredGrid& grid, const SparseVolume& source, const CompactOptions& options) {
+  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}),
+                     {.box = options.box, .peak = options.peak}) -
+         *options.psnr;
+}
+
 double allowedError(const RateTrials& trials, const CompactOptions& options) {
   if (options.psnr) return trials.squaresOf(*options.psnr + kPsnrMargin);
   return trials.error() * std::pow(10.0, options.loss / 10.0) + trials.negligibleError();
@@ -428,25 +443,10 @@ RateTrial chosen(RateTrials& trials, const CompactOptions& options, bool searche
   return searches ? chooseSteps(trials, goal, guess) : trials.make(stepsFor(trials, goal, guess));
 }
 
-/// What the PSNR of a result exceeds the wanted one by, dB.
-double excessOf(const StoredGrid& grid, const SparseVolume& source, const CompactOptions& options) {
-  return psnrOverBox(source, decodeGrid(grid, {.memory = memoryOf(source)}),
-                     {.box = options.box, .peak = options.peak}) -
-         *options.psnr;
-}
+}  // namespace
 
-/// True if a reader does not get the wanted PSNR from the result of a GPU. This may happen near the precision of float32
-/// only.
-bool missedByReader(const StoredGrid& grid, const SparseVolume& source,
-                    const CompactOptions& options) {
-  if (!options.psnr || *options.psnr < kMaxPsnrOfMargin || options.device.kind == DeviceKind::kCpu)
-    return false;
-  return excessOf(grid, source, options) < 0.0;
-}
-
-/// The errors of the first layers of a grid, by decoding them.
-std::vector<LayerError> decodedLayerErrors(const StoredGrid& grid, const SparseVolume& source,
-                                           const CompareOptions& options) {
+std::vector<LayerError> layerErrorsOf(const StoredGrid& grid, const SparseVolume& source,
+                                      const CompareOptions& options) {
   std::vector<LayerError> errors;
   const std::size_t layers = layerCount(grid);
   for (std::size_t k = 1; k <= layers && layers > 1; ++k) {
@@ -456,35 +456,6 @@ std::vector<LayerError> decodedLayerErrors(const StoredGrid& grid, const SparseV
   }
   return errors;
 }
-
-CompactResult compactOnce(const StoredGrid& grid, const SparseVolume& source,
-                          const CompactOptions& options) {
-  CompactResult result = Compactor(grid, source, options).toGoal();
-  if (!options.quick && missedByReader(result.grid, source, options)) {
-    CompactOptions again = options;
-    again.device = {};
-    return compactOnce(grid, source, again);
-  }
-  return result;
-}
-
-/// Looks for a smaller result, or one that reaches the wanted PSNR.
-/// \param best  a first result
-CompactResult corrected(CompactResult best, const StoredGrid& grid, const SparseVolume& source,
-                        const CompactOptions& options) {
-  CompactOptions aimed = options;
-  double excess = excessOf(best.grid, source, options), last = excess;
-  for (int n = 0; n < kMaxCorrections && !(excess >= 0.0 && excess <= kSmallExcess); ++n) {
-    *aimed.psnr += 0.5 * kSmallExcess - last;
-    CompactResult now = compactOnce(grid, source, aimed);
-    last = excessOf(now.grid, source, options);
-    const bool better = excess < 0.0 ? last > excess : last >= 0.0 && now.bytes < best.bytes;
-    if (better) best = std::move(now), excess = last;
-  }
-  return best;
-}
-
-}  // namespace
 
 QuantiserSteps finer(QuantiserSteps steps, double octaves) {
   return scaled(steps, std::exp2(-octaves));
@@ -496,12 +467,7 @@ Compactor::Compactor(const StoredGrid& grid, const SparseVolume& source,
       source_(source),
       options_(options),
       box_(options.box.value_or(activeBox(source))) {
-  if (grid.field.ellipsoidCount() == 0) return;
-  trials_.emplace(grid, RateTarget{.source = source,
-                                   .box = box_,
-                                   .device = options.device,
-                                   .peak = options.peak,
-                                   .quick = options.quick});
+  if (grid.field.ellipsoidCount() > 0) trials_.emplace(grid, source, options);
 }
 
 CompactResult Compactor::toGoal() {
@@ -509,14 +475,47 @@ CompactResult Compactor::toGoal() {
   return resultOf(chosen(*trials_, options_));
 }
 
-CompactResult Compactor::nearLoss() {
-  if (!trials_) return {grid_, {}, 0.0, 0};
-  return resultOf(chosen(*trials_, options_, false));
+CompactResult Compactor::toPsnrOfReader() {
+  CompactResult best = toGoal();
+  CompactOptions aimed = options_;
+  double excess = excessOf(best.grid, source_, options_), last = excess;
+  for (int n = 0; trials_ && n < kMaxCorrections && !(excess >= 0.0 && excess <= kSmallExcess);
+       ++n) {
+    *aimed.psnr += 0.5 * kSmallExcess - last;
+    CompactResult now = resultOf(chosen(*trials_, aimed));
+    last = excessOf(now.grid, source_, options_);
+    const bool isBetter = excess < 0.0 ? last > excess : last >= 0.0 && now.bytes < best.bytes;
+    if (isBetter) best = std::move(now), excess = last;
+  }
+  return best;
 }
 
 CompactResult Compactor::at(const QuantiserSteps& steps) {
   if (!trials_) return {grid_, {}, 0.0, 0};
   return resultOf(trials_->make(steps));
+}
+
+JudgedResult Compactor::toQuality(const JudgedGoal& goal) {
+  CompactResult made = goal.first ? at(*goal.first)
+                       : trials_  ? resultOf(chosen(*trials_, options_, false))
+                                  : toGoal();
+  const QuantiserSteps steps = made.steps;
+  RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, goal.quality + 0.5 * kQualitySpare,
+                    std::log(4.0) * goal.loss, 0.0);
+  std::optional<JudgedResult> best;
+  double bestOver = -HUGE_VAL;
+  for (int n = 1;; ++n) {
+    const double quality = goal.judge(made), over = quality - goal.quality - kJudgedMargin;
+    const bool isBetter = bestOver < 0.0 ? over > bestOver : over >= 0.0 && over < bestOver;
+    if (isBetter) best = JudgedResult{std::move(made), quality}, bestOver = over;
+    if ((over >= 0.0 && over <= kQualitySpare) || CancelScope::cancelled()) break;
+    search.learn(quality);
+    if (n == kMostJudged || search.ended()) break;
+    auto next = unlessCancelled([&] { return std::optional(at(finer(steps, search.next()))); });
+    if (!next) break;
+    made = std::move(*next);
+  }
+  return std::move(*best);
 }
 
 CompactResult Compactor::resultOf(RateTrial trial) {
@@ -534,13 +533,9 @@ CompactResult Compactor::resultOf(RateTrial trial) {
   result.grid.quantised = std::move(trial.quantised);
   if (hasErrors && !sameRule)
     result.grid.layerErrors =
-        decodedLayerErrors(result.grid, source_, {.box = box_, .peak = options_.peak});
+        layerErrorsOf(result.grid, source_, {.box = box_, .peak = options_.peak});
   return result;
 }
-
-}  // namespace esvr::encode
-
-namespace esvr {
 
 CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
                           const CompactOptions& options) {
@@ -548,9 +543,17 @@ CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
     if (!chunk.ellipsoids.kappa.empty())
       throw RuntimeFailure("cannot quantise grid '" + shownName(grid.descriptor.name) +
                            "': its ellipsoids have kappas of their own");
-  CompactResult result = encode::compactOnce(grid, source, options);
-  const bool isKnown = options.quick || !options.psnr || grid.topology != TopologyKind::kMask;
-  return isKnown ? std::move(result) : encode::corrected(std::move(result), grid, source, options);
+  Compactor compactor(grid, source, options);
+  if (options.quick || !options.psnr) return compactor.toGoal();
+  if (grid.topology == TopologyKind::kMask) return compactor.toPsnrOfReader();
+  CompactResult result = compactor.toGoal();
+  // A reader may miss the PSNR of a GPU's trial near the precision of float32 only.
+  const bool mayBeMissed =
+      options.device.kind == DeviceKind::kCuda && *options.psnr >= kMaxPsnrOfMargin;
+  if (!mayBeMissed || excessOf(result.grid, source, options) >= 0.0) return result;
+  CompactOptions again = options;
+  again.device = {};
+  return compactGrid(grid, source, again);
 }
 
-}  // namespace esvr
+}  // namespace esvr::encode

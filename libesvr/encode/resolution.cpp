@@ -221,9 +221,8 @@ class Averager {
 
   /// \param signs  of the places without a brick of a level set that is complete; null: they have the background
   void add(const SparseVolume& volume, const EmptySigns* signs = nullptr) {
-    std::vector<Coord> bricks;
-    for (std::size_t b = 0; b < volume.brickCount(); ++b)
-      bricks.push_back(brickOf(volume.brickCorner(b)));
+    std::vector<Coord> bricks = brickCorners(volume);
+    for (Coord& brick : bricks) brick = brickOf(brick);
     parallelFor(std::size_t{0}, coarse_.size(), [&](std::size_t c) {
       forEachCovered(bricks, coarse_[c], rule_.factor, [&](std::size_t b) {
         addVoxels(volume.brickValues(b), &volume.active[b], partsOf(bricks[b], coarse_[c]), rule_,
@@ -233,12 +232,11 @@ class Averager {
     });
   }
 
-  [[nodiscard]] SparseVolume finish() && {
-    std::vector<BrickInput> made;
+  /// Appends the coarse bricks that have an active voxel.
+  void appendTo(std::vector<BrickInput>& made) const {
     for (std::size_t c = 0; c < coarse_.size(); ++c)
       if (BrickInput brick = averageOf(coarse_[c], sums_[c], rule_); brick.active.count() > 0)
         made.push_back(std::move(brick));
-    return makeVolume(std::move(made), rule_.background);
   }
 
  private:
@@ -278,13 +276,18 @@ double bytesAtOnce(std::size_t bricks, std::size_t coarse) {
 /// Of a coarse brick in the result. It is there twice for a moment.
 constexpr double kBytesOfCoarse = 2.0 * sizeof(BrickInput);
 
-/// Appends the bricks of a volume whose bricks follow those that are there.
-void append(const SparseVolume& volume, std::vector<BrickInput>& bricks) {
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    BrickInput& brick =
-        bricks.emplace_back(BrickInput{volume.brickCorner(b), {}, volume.active[b]});
-    std::ranges::copy(volume.brickValues(b), brick.values.begin());
+/// Averages some coarse bricks at a time, so that their sums take little memory.
+/// \param add  add(coarse, averager) gives the averager the volumes that these coarse bricks cover
+template <class Add>
+SparseVolume averagedBy(const AverageRule& rule, std::span<const Coord> coarse, const Add& add) {
+  std::vector<BrickInput> made;
+  for (std::size_t first = 0; first < coarse.size(); first += kCoarseAtOnce) {
+    const auto some = coarse.subspan(first, std::min(kCoarseAtOnce, coarse.size() - first));
+    Averager averager({some.begin(), some.end()}, rule);
+    add(some, averager);
+    averager.appendTo(made);
   }
+  return makeVolume(std::move(made), rule.background);
 }
 
 AverageRule ruleFor(const StoredGrid& grid, double factor) {
@@ -299,12 +302,9 @@ AverageRule ruleFor(const StoredGrid& grid, double factor) {
 SparseVolume averagedSurface(const StoredGrid& grid, const AverageRule& rule,
                              const DecodeOptions& options) {
   const SparseVolume volume = decodeGrid(grid, options);
-  std::vector<Coord> corners;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
   const EmptySigns signs(volume);
-  Averager averager(coarseBricks(corners, rule.factor), rule);
-  averager.add(volume, &signs);
-  return std::move(averager).finish();
+  return averagedBy(rule, coarseBricks(brickCorners(volume), rule.factor),
+                    [&](std::span<const Coord>, Averager& to) { to.add(volume, &signs); });
 }
 
 /// The increasing corners of the bricks that coarse ones cover.
@@ -328,19 +328,13 @@ SparseVolume averaged(const StoredGrid& grid, const AverageRule& rule,
       double(coarse.size()) * kBytesOfCoarse + bytesAtOnce(bricks.size(), coarse.size()),
       options.maxBytes, "grid '" + shownName(grid.descriptor.name) + "' at this resolution");
   for (Coord& brick : bricks) brick = brickOf(brick);
-  std::vector<BrickInput> made;
-  for (std::size_t first = 0; first < coarse.size(); first += kCoarseAtOnce) {
-    const auto some =
-        std::span(coarse).subspan(first, std::min(kCoarseAtOnce, coarse.size() - first));
+  return averagedBy(rule, coarse, [&](std::span<const Coord> some, Averager& to) {
     const std::vector<Coord> covered = coveredBy(some, bricks, rule.factor);
-    Averager averager({some.begin(), some.end()}, rule);
     for (std::size_t b = 0; b < covered.size(); b += kBricksAtOnce)
-      averager.add(format::decodeBricks(
+      to.add(format::decodeBricks(
           grid, options,
           std::span(covered).subspan(b, std::min(kBricksAtOnce, covered.size() - b))));
-    append(std::move(averager).finish(), made);
-  }
-  return makeVolume(std::move(made), rule.background);
+  });
 }
 
 // ---- A finer grid
@@ -412,35 +406,17 @@ VolumeGrid decodeAtResolution(const StoredGrid& grid, double factor, const Decod
 
 SparseVolume coarsened(const SparseVolume& volume, int factor) {
   requireFactor(factor);
-  std::vector<Coord> corners;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
-  const std::vector<Coord> coarse = coarseBricks(corners, factor);
-  std::vector<BrickInput> made;
-  for (std::size_t first = 0; first < coarse.size(); first += kCoarseAtOnce) {
-    const std::size_t last = std::min(first + kCoarseAtOnce, coarse.size());
-    Averager averager(
-        {coarse.begin() + std::ptrdiff_t(first), coarse.begin() + std::ptrdiff_t(last)},
-        {.factor = double(factor), .background = volume.background});
-    averager.add(volume);
-    append(std::move(averager).finish(), made);
-  }
-  return makeVolume(std::move(made), volume.background);
+  const AverageRule rule{.factor = double(factor), .background = volume.background};
+  return averagedBy(rule, coarseBricks(brickCorners(volume), factor),
+                    [&](std::span<const Coord>, Averager& to) { to.add(volume); });
 }
 
 VectorGrid decodeVectorAtResolution(const std::string& name, StoredComponents components,
                                     double factor, const DecodeOptions& options) {
-  VectorGrid vectors;
-  DecodeOptions left = options;
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    VolumeGrid component = decodeAtResolution(components[c], factor, left);
-    if (c == 0) vectors.descriptor = std::move(component.descriptor);
-    vectors.background[c] = components[c].descriptor.background;
-    vectors.components[c] = std::move(component.volume);
-    const std::uint64_t bytes = vectors.components[c].values.size() * sizeof(float);
-    if (left.maxBytes != kNoMemoryLimit) left.maxBytes -= std::min(left.maxBytes, bytes);
-  }
-  vectors.descriptor.name = name;
-  return vectors;
+  return format::vectorsOf(name, components, options,
+                           [&](const StoredGrid& component, const DecodeOptions& left) {
+                             return decodeAtResolution(component, factor, left);
+                           });
 }
 
 Field amongOtherVoxels(Field field, double factor) {

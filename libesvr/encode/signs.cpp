@@ -27,7 +27,7 @@
 
 // ---- The residual
 
-namespace esvr {
+namespace esvr::encode {
 namespace {
 
 /// Largest difference of evaluateBricks between two machines, as a share of the sum of |I|: twice
@@ -68,7 +68,7 @@ std::vector<double> marginsOf(const Field& field, std::span<const Coord> corners
 }
 
 /// The sum in the bricks of a grid, with all voxels active.
-SparseVolume sumOf(const StoredGrid& grid) {
+SparseVolume sumWithin(const StoredGrid& grid) {
   return revoxelise(grid.field, {.threshold = -std::numeric_limits<float>::max(),
                                  .range = voxelRule(grid).range,
                                  .bricks = grid.bricks,
@@ -127,7 +127,7 @@ StoredGrid withSigns(StoredGrid grid, const SparseVolume& source) {
   const double margin = margins.empty() ? 0.0 : *std::max_element(margins.begin(), margins.end());
   const double step =
       std::max(double(source.background) / kStepsOfHalfWidth, kMarginsOfStep * margin);
-  const SparseVolume sum = sumOf(grid);
+  const SparseVolume sum = sumWithin(grid);
   std::vector<BrickCodes> bricks;
   for (std::size_t b = 0; b < source.brickCount(); ++b) {
     throwIfCancelled();
@@ -139,11 +139,8 @@ StoredGrid withSigns(StoredGrid grid, const SparseVolume& source) {
   return grid;
 }
 
-}  // namespace esvr
-
 // ---- Converting a band
 
-namespace esvr::encode {
 namespace {
 
 /// Conversions to a size: each one after the first leaves more room for the residual of the signs.

@@ -26,6 +26,13 @@ using ConvertTo = std::function<Conversion(const Job&)>;
 /// \return nothing if there is no such pair, and no surface
 [[nodiscard]] std::optional<double> changeAcrossSurface(const SparseVolume& volume);
 
+/// Corrects the sign of every voxel of a narrow band where the sum has another one than the source,
+/// by a residual. A reader on any machine then finds the signs of the source: evaluations on different
+/// machines differ by rounding (field.h), and the residual includes a margin for that.
+/// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
+/// \return the grid without a residual if no sign is wrong
+[[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
+
 /// Checks that a decoded narrow band has the signs of its source, in its bricks and elsewhere.
 /// \throws RuntimeFailure  a sign differs; the text names the grid and the voxel
 void requireSigns(const ConvertInput& input, const SparseVolume& decoded);

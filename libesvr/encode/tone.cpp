@@ -13,7 +13,6 @@
 
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
-#include "encode/tuning.h"
 #include "encode/voxels.h"
 #include "esvr/encode.h"
 #include "esvr/grid_coding.h"
@@ -35,6 +34,16 @@ bool leavesTheMeasure(const Goal& goal) {
 
 /// dB by which the PSNR of a preset's pictures is lower than that of its values.
 constexpr double kPicturesBelowValues = 2.0;
+/// dB by which the PSNR over the active voxels may be lower than that of the transmittance, where a tone curve is used.
+/// Cycles shows smoke1 with 34 dB over the active voxels at 41 to 43 dB (docs/convert.md).
+constexpr double kPicturesAboveValues = 4.0;
+/// The ninth decile of the active values relative to their median from which on a tone curve is tried, and the dB by which
+/// it must be better.
+constexpr double kLeastToneRange = 3.0, kToneGain = 0.1;
+/// dB by which the quality that is judged must be higher where its pictures are up to this number of dB worse. Without a
+/// curve, one of 16 frames of a plume took 9.5 KB instead of 4.3, for a quality of 35.5 dB instead of 40.5 and pictures
+/// that are 0.1 dB better.
+constexpr double kToneQualityGain = 2.0, kMostToneLoss = 0.5;
 
 /// The sum of ofBrick(values) over the bricks, in an order that does not depend on the number of threads.
 template <class OfBrick>
@@ -84,8 +93,8 @@ void forgiveFilled(const SparseVolume& source, const VoxelLayer* filled, SparseV
   if (!filled) return;
   parallelFor(std::size_t{0}, filled->bricks.size(), [&](std::size_t b) {
     const Coord corner = filled->origin + filled->bricks[b] * kBrickSide;
-    const auto to = findBrick(volume, brickOf(corner - volume.origin));
-    const auto from = findBrick(source, brickOf(corner - source.origin));
+    const auto to = brickWith(volume, corner);
+    const auto from = brickWith(source, corner);
     if (!to || !from) return;
     forEachActive(filled->active[b], [&](int v) {
       volume.brickValues(*to)[std::size_t(v)] = source.brickValues(*from)[std::size_t(v)];
@@ -114,7 +123,7 @@ Judge::Judge(const ConvertInput& input, const ConvertOptions& options, ToneCurve
   pictures_.emplace(input.source, options.fit.box);
   mass_ = sumOfBricks(input.source, sumOf);
   if (leavesTheMeasure(options.goal))
-    valueGain_ = (tone.isOn() ? kTuning.picturesAboveValues : -kPicturesBelowValues) -
+    valueGain_ = (tone.isOn() ? kPicturesAboveValues : -kPicturesBelowValues) -
                  boxGain(input.source, options);
 }
 
@@ -242,7 +251,7 @@ ToneCurve likelyTone(const SparseVolume& volume) {
     return double(*at);
   };
   const double median = quantile(0.5), quartile = quantile(0.75), high = quantile(0.9);
-  if (high < kTuning.leastToneRange * median) return {};
+  if (high < kLeastToneRange * median) return {};
   return {float(std::cbrt(median * quartile * quartile))};
 }
 
@@ -257,8 +266,7 @@ struct Scouted {
 bool isBetter(const Scouted& with, const Scouted& without) {
   const double pictures = with.forTones - without.forTones;
   const double quality = with.point.psnr - without.point.psnr;
-  return pictures > kTuning.toneGain ||
-         (quality > kTuning.toneQualityGain && pictures > -kTuning.mostToneLoss);
+  return pictures > kToneGain || (quality > kToneQualityGain && pictures > -kMostToneLoss);
 }
 
 Scouted scouted(ToneCurve tone, const ConvertInput& input, const ConvertOptions& options,
@@ -285,7 +293,7 @@ ToneChoice chosenByFits(ToneCurve likely, const ConvertInput& given,
   const ConvertInput input{given.descriptor, isCoarse ? coarse : given.source};
   ConvertOptions options = givenOptions;
   // The averages have the filled voxels in other places. Their values are smooth, and may count here.
-  if (isCoarse) options.filledVoxels = 0, options.filled = nullptr;
+  if (isCoarse) options.filled = nullptr;
   const Scouted with = scouted(likely, input, options, count),
                 without = scouted({}, input, options, count);
   const bool isOn = isBetter(with, without);
@@ -319,18 +327,6 @@ void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid) {
   if (grid.voxels && grid.voxels->form != VoxelForm::kQuantised) return;
   grid.tone = tone;
   if (grid.activeThreshold > 0.0f) grid.activeThreshold = tone.value(grid.activeThreshold);
-}
-
-void measureLayers(const ConvertInput& input, StoredGrid& grid) {
-  const BestSoFar completion;  // a grid that is there is not given up
-  std::vector<LayerError> errors;
-  const std::size_t all = layerCount(grid);
-  for (std::size_t layers = 1; layers <= all && all > 1; ++layers) {
-    const VolumeMetrics m = compareVolumes(
-        input.source, decodeGrid(firstLayers(grid, layers), {.memory = memoryOf(input.source)}));
-    errors.push_back({float(m.psnrBox), float(m.maxError)});
-  }
-  grid.layerErrors = std::move(errors);
 }
 
 // ---- A bound relative to each value

@@ -44,6 +44,8 @@ class Judge {
 
   [[nodiscard]] const SparseVolume& values() const { return values_; }
   [[nodiscard]] ToneCurve tone() const { return tone_; }
+  /// The box and the peak of the PSNR over values.
+  [[nodiscard]] const CompareOptions& comparison() const { return box_; }
 
  private:
   void toValues(SparseVolume& volume) const;
@@ -101,8 +103,5 @@ void requireRelativeBound(const ConvertInput& input, const SparseVolume& decoded
 
 /// Makes a grid of tones, which was converted like one of values, a grid of values.
 void setTone(const ConvertInput& input, ToneCurve tone, StoredGrid& grid);
-
-/// Measures the errors of the layers of a judged grid, if it has more than one.
-void measureLayers(const ConvertInput& input, StoredGrid& grid);
 
 }  // namespace esvr::encode

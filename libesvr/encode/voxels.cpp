@@ -41,12 +41,11 @@ DecodedValues decodedValues(const Job& job) {
 
 // ---- The sample
 
-SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
+std::vector<std::size_t> sampledBricks(const std::vector<Coord>& bricks, std::size_t count) {
   constexpr std::size_t kBricksOfRun = 64;
-  if (volume.brickCount() <= bricks) return volume;
-  const std::size_t runs = std::max<std::size_t>(bricks / kBricksOfRun, 1);
-  const auto order = codec::codingOrder(volume.bricks);
-  const std::size_t length = bricks / runs, last = order.size() - length;
+  const std::size_t runs = std::max<std::size_t>(count / kBricksOfRun, 1);
+  const auto order = codec::codingOrder(bricks);
+  const std::size_t length = count / runs, last = order.size() - length;
   std::vector<std::size_t> chosen;
   for (std::size_t run = 0; run < runs; ++run) {
     const auto first = std::ptrdiff_t(runs > 1 ? run * last / (runs - 1) : last / 2);
@@ -55,10 +54,15 @@ SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
   }
   std::sort(chosen.begin(), chosen.end());
   chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  return chosen;
+}
+
+SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks) {
+  if (volume.brickCount() <= bricks) return volume;
   SparseVolume sample;
   sample.origin = volume.origin;
   sample.background = volume.background;
-  for (const std::size_t b : chosen) {
+  for (const std::size_t b : sampledBricks(volume.bricks, bricks)) {
     const auto values = volume.brickValues(b);
     sample.bricks.push_back(volume.bricks[b]);
     sample.active.push_back(volume.active[b]);
@@ -141,6 +145,23 @@ double leastBitsOfExact(VoxelForm form) {
   return form == VoxelForm::kPalette ? 0.0 : form == VoxelForm::kHalf ? 5.0 : 12.0;
 }
 
+/// Price of a bit (ThriftOptions): 0.05 gives files that are up to 1 % larger at 40 to 60 dB, 0.12 up to 5 % (Lab, "Voxel
+/// coding"). For voxels that are predicted from another grid or from the frame before, those whose bits are not worth
+/// their price keep to the prediction; in a frame this also means less flicker. Of tones, 0.12 instead of 0.08 gains 0.2 dB
+/// of what is seen of smoke1 in 65 KB and 0.5 dB of the plume in 156 KB.
+constexpr double kPrice = 0.08, kPredictedPrice = 0.14, kFramePrice = 0.2, kTonedPrice = 0.12;
+/// The price of the error of a brick where a volume is judged by what is seen (ThriftOptions::massPrice).
+constexpr double kMassPrice = 0.012;
+/// Share of the errors of the frame before that voxels keep. On a fire and a gas, 0 takes fewer bytes and flickers; a half
+/// and more takes many bytes for little less flicker.
+constexpr double kErrorsKept = 0.25;
+/// Share of the active voxels with one value from which on a lattice that contains it is tried.
+constexpr double kPlateauShare = 0.02;
+/// Exact voxels are stored if they take at most this factor of the bytes of the best other grid for a PSNR, or these
+/// bytes more.
+constexpr double kExactFactor = 1.03;
+constexpr std::uint64_t kExactBytes = 64;
+
 // Bounds are counted in octaves below the span of the values: 1 is half the span.
 constexpr double kCoarsest = 1.0, kFinest = 24.0;  // float32 has 24 bits
 constexpr double kNarrowest = 0.002;               // a bound that differs by 0.14 % is not tried
@@ -170,12 +191,12 @@ RootRange octaves() { return {kCoarsest, kFinest, kNarrowest}; }
 
 }  // namespace
 
-Candidate estimateExactVoxels(const Job& job) {
+Candidate estimateExactVoxels(const Job& job, std::size_t sampleBricks) {
   const SparseVolume& source = valuesOf(job);
   std::uint64_t bytes = 0;
   bool isSampled = false;
   const double seconds = secondsOf([&] {
-    const SparseVolume sample = sampleFor(job, source, kTuning.sampleBricks);
+    const SparseVolume sample = sampleFor(job, source, sampleBricks);
     isSampled = sample.brickCount() > 0;
     bytes = exactBytesOf(isSampled ? sample : source, source) + bytesBeside(job);
   });
@@ -221,12 +242,13 @@ std::optional<VoxelCandidate> smallerExactVoxels(const Job& job, const StoredGri
 
 // ---- Settings
 
-VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
+VoxelSearch::VoxelSearch(const Job& job, const Aim& goal, std::size_t sampleBricks)
     : job_(job),
       goal_(goal),
+      sampleBricks_(sampleBricks),
       box_(job.options.fit.box.value_or(activeBox(job.input.source))),
       peak_(job.options.fit.peak ? *job.options.fit.peak : peakOf(job.input.source)),
-      sample_(sampleFor(job, job.input.source, goal.sampleBricks)),
+      sample_(sampleFor(job, job.input.source, sampleBricks)),
       tryOn_(sample_.brickCount() > 0 ? sample_ : job.input.source),
       share_(double(tryOn_.brickCount()) / double(job.input.source.brickCount())),
       range_(spanOf(job.input.source).length()),
@@ -237,9 +259,11 @@ VoxelSearch::VoxelSearch(const Job& job, const Goal& goal)
   sampleMass_ = job.judge->massOf(sample_);
 }
 
+bool VoxelSearch::hasPlateau() const { return plateau_.share >= kPlateauShare; }
+
 double VoxelSearch::price() const {
-  if (!job_.options.previous) return isToned(job_) ? kTuning.tonedPrice : kTuning.price;
-  return job_.options.keepsPastErrors ? kTuning.framePrice : kTuning.predictedPrice;
+  if (!job_.options.previous) return isToned(job_) ? kTonedPrice : kPrice;
+  return job_.options.keepsPastErrors ? kFramePrice : kPredictedPrice;
 }
 
 double VoxelSearch::boundOf(const Setting& setting) const {
@@ -247,27 +271,25 @@ double VoxelSearch::boundOf(const Setting& setting) const {
   return range_ * std::exp2(-setting.octave);
 }
 
-/// \param tooMany  set to the expected bytes of the codes if these clearly exceed the size, so that
-///                 the work stopped and the layer is of no use; null: the work never stops
-VoxelLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setting,
-                                std::uint64_t* tooMany) const {
-  VoxelLayer layer = nearestLayer(volume, boundOf(setting), voxelActivity(job_), voxelSigns(job_));
-  if (setting.price == 0.0) return layer;
+/// \param isSized  the work stops where codes clearly exceed the size (ThriftyLayer::tooMany)
+ThriftyLayer VoxelSearch::layerOf(const SparseVolume& volume, const Setting& setting,
+                                  bool isSized) const {
+  const double bound = boundOf(setting);
+  ThriftyLayer made{nearestLayer(volume, bound, voxelActivity(job_), voxelSigns(job_))};
+  if (setting.price == 0.0) return made;
   const StoredGrid* previous = job_.options.previous;
   ThriftOptions thrift{setting.price, previous && previous->voxels ? &*previous->voxels : nullptr,
-                       job_.options.keepsPastErrors ? kTuning.errorsKept : 0.0, voxelSigns(job_),
-                       isToned(job_) ? kTuning.massPrice : 0.0};
-  if (tooMany) {
+                       job_.options.keepsPastErrors ? kErrorsKept : 0.0, voxelSigns(job_),
+                       isToned(job_) ? kMassPrice : 0.0};
+  if (isSized) {
     const double left = double(*goal_.bytes - std::min(*goal_.bytes, besides_));
-    thrift.mostBytes =
-        std::uint64_t(kCodesBeyondSize * left * shareOfBytes(volume, boundOf(setting)));
+    thrift.mostBytes = std::uint64_t(kCodesBeyondSize * left * shareOfBytes(volume, bound));
   }
-  ThriftyLayer thrifty = thriftyLayer(volume, std::move(layer), thrift);
-  if (tooMany && thrifty.tooMany) *tooMany = *thrifty.tooMany;
-  if (seesPictures(job_) && !thrifty.tooMany)
-    thrifty.layer.divisor /=
-        job_.judge->massFactor(&volume == &sample_ ? sampleMass_ : mass_, volumeOf(thrifty.layer));
-  return std::move(thrifty.layer);
+  made = thriftyLayer(volume, std::move(made.layer), thrift);
+  if (seesPictures(job_) && !made.tooMany)
+    made.layer.divisor /=
+        job_.judge->massFactor(&volume == &sample_ ? sampleMass_ : mass_, volumeOf(made.layer));
+  return made;
 }
 
 double VoxelSearch::shareOf(const SparseVolume& volume) const {
@@ -284,7 +306,7 @@ double VoxelSearch::psnrOn(const SparseVolume& volume, const VoxelLayer& layer) 
 }
 
 VoxelSearch::Tried VoxelSearch::tried(const SparseVolume& volume, const Setting& setting) const {
-  Tried made{setting, layerOf(volume, setting)};
+  Tried made{setting, layerOf(volume, setting).layer};
   made.psnr = psnrOn(volume, made.layer);
   return made;
 }
@@ -326,18 +348,20 @@ std::optional<VoxelSearch::Tried> VoxelSearch::coarsest(const SparseVolume& volu
 
 // ---- A PSNR
 
-/// The smallest voxels found whose lattice has the value of the plateau. The PSNR grows with the logarithm of the number
-/// of its levels, though it need not be monotone where there are other plateaus.
-std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr,
-                                                            const Setting& first) const {
+/// The smallest voxels found whose lattice has the value of the plateau and that reach the PSNR. It grows with the
+/// logarithm of the number of levels, though it need not be monotone where there are other plateaus.
+std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(const SparseVolume& volume,
+                                                            const Setting& first, int mostTrials,
+                                                            double tolerance) const {
+  const double psnr = *goal_.psnr;
   std::optional<Tried> best;
-  double tooFew = 0.0, enough = HUGE_VAL;
-  double levels = std::max(std::round(0.5 * plateau_.value / boundOf(first)), 1.0);
-  for (int n = 0; n < kNearestTrials && enough - tooFew > 1.0; ++n) {
-    Tried now = tried(tryOn_, {.levels = levels});
-    const double wanted = levels * std::exp2((psnr - now.psnr) / kDbPerOctave);
-    (now.psnr >= psnr ? enough : tooFew) = levels;
-    if (now.psnr >= psnr) best = std::move(now);
+  double tooFew = 0.0, enough = HUGE_VAL, levels = first.levels;
+  for (int n = 0; n < mostTrials && enough - tooFew > 1.0; ++n) {
+    Tried now = tried(volume, {.price = first.price, .levels = levels});
+    const double over = now.psnr - psnr, wanted = levels * std::exp2(-over / kDbPerOctave);
+    (over >= 0.0 ? enough : tooFew) = levels;
+    if (over >= 0.0) best = std::move(now);
+    if (over >= 0.0 && over <= tolerance) break;
     levels = std::clamp(std::isfinite(wanted) ? std::ceil(wanted) : tooFew + 1.0, tooFew + 1.0,
                         std::max(enough - 1.0, tooFew + 1.0));
   }
@@ -345,12 +369,16 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fewestLevels(double psnr,
   const bool isNear = best && best->psnr < psnr + kDbPerOctave;
   for (const double price : kPlateauPrices) {
     if (!isNear) break;
-    Tried trial = tried(tryOn_, {.price = price, .levels = enough});
+    if (price <= first.price) continue;
+    Tried trial = tried(volume, {.price = price, .levels = enough});
     if (trial.psnr < psnr) break;
     best = std::move(trial);
   }
-  if (best) best->bytes = bytesOf(tryOn_, best->layer, boundOf(best->setting));
   return best;
+}
+
+double VoxelSearch::levelsOf(const Setting& setting) const {
+  return std::max(std::round(0.5 * plateau_.value / boundOf(setting)), 1.0);
 }
 
 /// The coarsest thrifty voxels that reach a PSNR.
@@ -363,12 +391,11 @@ std::optional<VoxelSearch::Tried> VoxelSearch::thriftyForPsnr(const Tried& plain
 
 void VoxelSearch::tryForPsnr() {
   const double psnr = *goal_.psnr;
-  if (exactIsBest()) return;
   const Setting first{psnr / kDbPerOctave - 1.0};
   std::optional<Tried> with;
   if (hasPlateau() && !job_.options.previous && range_ > 0.0) {
-    with = fewestLevels(psnr, first);
-    plateauChoice_.tried = true;
+    with = fewestLevels(tryOn_, {.levels = levelsOf(first)}, kNearestTrials, 0.0);
+    if (with) with->bytes = bytesOf(tryOn_, with->layer, boundOf(with->setting));
   }
   const bool isFine = with && with->setting.levels >= kFineLevels;
   if (!isFine && range_ > 0.0)
@@ -377,38 +404,19 @@ void VoxelSearch::tryForPsnr() {
     if (auto cheaper = thriftyForPsnr(*best_)) best_ = std::move(cheaper);
     best_->bytes = bytesOf(tryOn_, best_->layer, boundOf(best_->setting));
   }
-  decidePlateau(std::move(with));
+  considerPlateau(std::move(with));
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
-  if (!exact_ && bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
+  if (bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
     exact_ = job_.options.previous ? exactVoxels(job_).bytes : exactBytes();
 }
 
-/// True if exact voxels take hardly more bytes than their active mask, which all voxels of the grid need.
-bool VoxelSearch::exactIsBest() {
-  if (voxelActivity(job_) != Activity::kExact || job_.options.previous || isToned(job_))
-    return false;
-  VoxelLayer exact = smallestExactLayer(tryOn_);
-  if (exact.form != VoxelForm::kPalette) return false;
-  exact_ = exactBytes();
-  VoxelLayer bare = exact;
-  std::fill(bare.codes.begin(), bare.codes.end(), 0);
-  const double least =
-      bytesOfCodes(bare) / (bytesOfCodes(exact) / double(*exact_ - besides_)) + double(besides_);
-  return double(*exact_) <=
-         std::max(kTuning.exactFactor * least, least + double(kTuning.exactBytes));
-}
-
-/// Takes the lattice with the plateau where it is better.
-void VoxelSearch::decidePlateau(std::optional<Tried> with) {
-  if (!plateauChoice_.tried) return;
-  if (best_) plateauChoice_.bytesWithout = best_->bytes;
-  if (with) plateauChoice_.bytesWith = with->bytes;
-  const auto better = [&](const Tried& a, const Tried& b) {
+/// Takes a lattice with the plateau where it is better.
+void VoxelSearch::considerPlateau(std::optional<Tried> with) {
+  const auto isBetter = [&](const Tried& a, const Tried& b) {
     return goal_.psnr ? a.bytes < b.bytes : a.psnr > b.psnr;
   };
-  plateauChoice_.used = with && (!best_ || better(*with, *best_));
-  if (plateauChoice_.used) best_ = std::move(with);
+  if (with && (!best_ || isBetter(*with, *best_))) best_ = std::move(with);
 }
 
 // ---- A size
@@ -417,16 +425,17 @@ void VoxelSearch::decidePlateau(std::optional<Tried> with) {
 /// layer and PSNR then.
 std::optional<VoxelSearch::Tried> VoxelSearch::sized(const SparseVolume& volume,
                                                      const Setting& setting) const {
-  std::uint64_t tooMany = 0;
-  Tried made{setting, layerOf(volume, setting, &tooMany)};
-  if (tooMany > 0) {
+  const double bound = boundOf(setting);
+  ThriftyLayer thrifty = layerOf(volume, setting, true);
+  Tried made{setting, {}};
+  if (thrifty.tooMany) {
     made.bytes =
-        std::max(std::uint64_t(double(tooMany) / shareOfBytes(volume, boundOf(setting))) + besides_,
+        std::max(std::uint64_t(double(*thrifty.tooMany) / shareOfBytes(volume, bound)) + besides_,
                  *goal_.bytes + 1);
-    made.layer = {};
     return made;
   }
-  made.bytes = bytesOf(volume, made.layer, boundOf(setting));
+  made.layer = std::move(thrifty.layer);
+  made.bytes = bytesOf(volume, made.layer, bound);
   if (made.bytes <= *goal_.bytes) made.psnr = psnrOn(volume, made.layer);
   return made;
 }
@@ -440,8 +449,7 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fullest(const SparseVolume& volum
   std::optional<Tried> best;
   for (int n = 0; n < kSizeTrials && !search.ended(); ++n) {
     Setting setting{search.next(), first.price};
-    if (first.levels > 0.0)
-      setting.levels = std::max(std::round(0.5 * plateau_.value / boundOf(setting)), 1.0);
+    if (first.levels > 0.0) setting.levels = levelsOf(setting);
     auto now = unlessCancelled([&] { return sized(volume, setting); });
     if (!now && best) break;
     if (!now) throw Cancelled();
@@ -454,20 +462,20 @@ std::optional<VoxelSearch::Tried> VoxelSearch::fullest(const SparseVolume& volum
   return best;
 }
 
-bool VoxelSearch::mayReach(double psnr) {
-  bool may = true;
+std::optional<Candidate> VoxelSearch::tooLargeFor(double psnr) {
+  std::optional<Candidate> tooLarge;
   seconds_ += secondsOf([&] {
     if (job_.options.previous || !std::isfinite(psnr) || !(range_ > 0.0)) return;
     auto plain =
         coarsest(tryOn_, psnr, {psnr / kDbPerOctave - 1.0}, kNearestTrials, kPsnrTolerance);
-    if (!plain) return;
+    if (!plain || hasPlateau()) return;
     const auto made = sized(tryOn_, {plain->setting.octave, price()});
-    const double margin = isSampled() ? kTuning.estimateMargin : 1.0;
-    may = hasPlateau() || double(made->bytes) <= margin * double(*goal_.bytes);
-    if (!may) tooLarge_ = Candidate{made->bytes, plain->psnr, true};
+    const double margin = isSampled() ? kEstimateMargin : 1.0;
+    if (double(made->bytes) > margin * double(*goal_.bytes))
+      tooLarge = Candidate{made->bytes, plain->psnr, true};
   });
-  if (tooLarge_) tooLarge_->seconds = seconds_;
-  return may;
+  if (tooLarge) tooLarge->seconds = seconds_;
+  return tooLarge;
 }
 
 void VoxelSearch::tryForSize() {
@@ -477,23 +485,16 @@ void VoxelSearch::tryForSize() {
   const Setting first{2.0 + 8.0 * double(*goal_.bytes) / active, price()};
   best_ = fullest(tryOn_, first);
   if (!hasPlateau()) return;
-  plateauChoice_.tried = true;
   Setting setting = best_ ? best_->setting : first;
   setting.levels = 1.0;
-  decidePlateau(best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
-                      : fullest(tryOn_, setting));
+  considerPlateau(best_ ? unlessCancelled([&] { return fullest(tryOn_, setting); })
+                        : fullest(tryOn_, setting));
 }
 
 // ---- The result
 
-/// About the bytes of a grid of exact voxels.
 std::uint64_t VoxelSearch::exactBytes() const {
-  const SparseVolume& values = valuesOf(job_);
-  const bool isOwn = &values == &job_.input.source;
-  const SparseVolume sample =
-      isOwn || !isSampled() ? SparseVolume{} : sampleOf(values, goal_.sampleBricks);
-  const SparseVolume& on = isOwn ? tryOn_ : isSampled() ? sample : values;
-  return exactBytesOf(on, values) + besides_;
+  return estimateExactVoxels(job_, sampleBricks_).bytes;
 }
 
 /// A judge sees the volume as a whole. By how much its quality exceeds the PSNR of a sample is found with
@@ -503,7 +504,7 @@ void VoxelSearch::matchJudge() {
   const SparseVolume& source = job_.input.source;
   double octave = goal_.psnr ? *goal_.psnr / kDbPerOctave - 1.0 : kOctaveOfSize;
   for (int n = 0; n < 2; ++n) {
-    const VoxelLayer layer = layerOf(source, {.octave = octave});
+    const VoxelLayer layer = layerOf(source, {.octave = octave}).layer;
     const double quality = psnrOn(source, layer);
     SparseVolume made = volumeOf(layer);
     forgiveFilled(source, job_.options.filled, made);
@@ -548,47 +549,19 @@ VoxelCandidate VoxelSearch::candidateOf(Tried tried) const {
   return made;
 }
 
-/// The voxels of the whole volume whose lattice has the plateau: about as many levels as on the sample,
-/// and the price that then uses up the PSNR.
-std::optional<VoxelSearch::Tried> VoxelSearch::withPlateau(const SparseVolume& volume,
-                                                           Setting setting) const {
-  std::optional<Tried> best;
-  double tooFew = 0.0;
-  for (int n = 0; n < kPlateauTrials && setting.levels > tooFew; ++n) {
-    Tried now = tried(volume, setting);
-    const double excess = now.psnr - *goal_.psnr;
-    if (excess < 0.0) tooFew = std::max(tooFew, setting.levels);
-    const double wanted = setting.levels * std::pow(10.0, -excess / 20.0);
-    if (excess >= 0.0 && (!best || setting.levels <= best->setting.levels)) best = std::move(now);
-    double next = std::max(std::ceil(wanted), tooFew + 1.0);
-    if (excess > kFinalTolerance) next = std::min(next, setting.levels - 1.0);
-    if (best && next >= best->setting.levels) break;
-    setting.levels = next;
-  }
-  for (const double price : kPlateauPrices) {
-    if (!best || price <= best->setting.price) continue;
-    Tried now = tried(volume, {.price = price, .levels = best->setting.levels});
-    if (now.psnr < *goal_.psnr) break;
-    best = std::move(now);
-  }
-  return best;
-}
-
 /// Quantised voxels of the whole volume with the setting that is best on the sample.
 std::optional<VoxelCandidate> VoxelSearch::finished() {
   if (!best_) return std::nullopt;
   if (!isSampled()) return candidateOf(std::move(*best_));
   const SparseVolume& source = job_.input.source;
   const Setting setting = best_->setting;
-  if (goal_.bytes) {
-    auto found = fullest(source, setting);
-    return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
-  }
-  if (setting.levels == 0.0) {
-    auto found = coarsest(source, *goal_.psnr, setting, kThriftyTrials, kFinalTolerance);
-    return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
-  }
-  auto found = withPlateau(source, setting);
+  std::optional<Tried> found;
+  if (goal_.bytes)
+    found = fullest(source, setting);
+  else if (setting.levels > 0.0)
+    found = fewestLevels(source, setting, kPlateauTrials, kFinalTolerance);
+  else
+    found = coarsest(source, *goal_.psnr, setting, kThriftyTrials, kFinalTolerance);
   return found ? std::optional(candidateOf(std::move(*found))) : std::nullopt;
 }
 
@@ -597,24 +570,23 @@ std::optional<VoxelCandidate> VoxelSearch::run() {
   std::optional<VoxelCandidate> found;
   seconds_ += secondsOf([&] {
     // Exact voxels of a size are the best ones, so that they are tried first.
-    const double margin = kTuning.estimateMargin;
+    const double margin = kEstimateMargin;
     if (goal_.bytes && exact_ && double(*exact_) <= margin * double(*goal_.bytes)) {
       VoxelCandidate exact = exactVoxels(job_);
       if (exact.bytes <= *goal_.bytes) found = std::move(exact);
     }
     if (!found) found = finished();
     if (goal_.bytes) return;
-    const double most = found ? std::max(kTuning.exactFactor * double(found->bytes),
-                                         double(found->bytes + kTuning.exactBytes))
-                              : HUGE_VAL;
+    const double most =
+        found ? std::max(kExactFactor * double(found->bytes), double(found->bytes + kExactBytes))
+              : HUGE_VAL;
     if (found && (!exact_ || double(*exact_) > margin * most)) return;
     auto exact = unlessCancelled([&] { return std::optional(exactVoxels(job_)); });
     if (exact && double(exact->bytes) <= most) found = std::move(exact);
   });
   if (!found && goal_.psnr) throw Cancelled();
   if (found && goal_.bytes && found->bytes > *goal_.bytes) found.reset();
-  if (found && plateauChoice_.used) plateauChoice_.bytesWith = found->bytes;
-  if (found) found->seconds = seconds_, found->plateau = plateauChoice_;
+  if (found) found->seconds = seconds_;
   return found;
 }
 

@@ -4,18 +4,16 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "encode/job.h"
-#include "encode/tuning.h"
 
 namespace esvr::encode {
 
-/// Whether a lattice that contains the most frequent value, the plateau, was tried and is used, and the bytes of the best
-/// grids with and without it, if they were measured.
-struct PlateauChoice {
-  bool tried = false, used = false;
-  std::optional<std::uint64_t> bytesWith{}, bytesWithout{};
-};
+/// Factor by which an estimate of the bytes of voxels may be wrong. Within it, voxels are coded.
+inline constexpr double kEstimateMargin = 1.2;
+/// Bricks of the sample on which voxels of large volumes are tried, in runs of 64 neighbours.
+inline constexpr std::size_t kBricksOfSample = 2048;
 
 /// A grid that holds voxels.
 struct VoxelCandidate {
@@ -23,7 +21,6 @@ struct VoxelCandidate {
   std::uint64_t bytes = 0;  ///< bytes that it adds to the file or frame
   double psnr = 0.0;        ///< quality, dB; +inf if the voxels are exact
   double seconds = 0.0;     ///< wall-clock seconds of the whole search
-  PlateauChoice plateau;
 };
 
 /// The most frequent value of the active voxels besides 0 and the background, which are exact anyway,
@@ -34,16 +31,9 @@ struct Plateau {
 
 class VoxelSearch {
  public:
-  struct Goal {
-    std::optional<double> psnr{};  ///< dB over the box
-    std::optional<std::uint64_t>
-        bytes{};  ///< bytes that the grid may add to a file, without a PSNR
-    /// Bricks of the sample. Volumes of less than four times as many are tried as a whole.
-    std::size_t sampleBricks = kTuning.sampleBricks;
-  };
-
   /// The job must outlive the search.
-  VoxelSearch(const Job& job, const Goal& goal);
+  /// \param sampleBricks  bricks of the sample; volumes of less than four times as many are tried as a whole
+  VoxelSearch(const Job& job, const Aim& goal, std::size_t sampleBricks = kBricksOfSample);
   VoxelSearch(const VoxelSearch&) = delete;
   VoxelSearch& operator=(const VoxelSearch&) = delete;
 
@@ -52,10 +42,9 @@ class VoxelSearch {
   /// \return nothing if no voxels can be that small
   [[nodiscard]] std::optional<Candidate> estimate();
 
-  /// For a size: false if the coarsest voxels with a PSNR are clearly too large, which takes less time
-  /// to find out than estimate(). They are recorded by tooLarge() then.
-  [[nodiscard]] bool mayReach(double psnr);
-  [[nodiscard]] const std::optional<Candidate>& tooLarge() const { return tooLarge_; }
+  /// For a size: the coarsest voxels with a PSNR if they are clearly too large, which takes less time to find out than
+  /// estimate(); nothing if they may fit.
+  [[nodiscard]] std::optional<Candidate> tooLargeFor(double psnr);
 
   /// The smallest voxels found that reach the PSNR, or the best ones that keep to the size. If the
   /// search is cancelled, the first ones that meet the goal.
@@ -83,11 +72,11 @@ class VoxelSearch {
 
   [[nodiscard]] bool isSampled() const { return share_ < 1.0; }
   [[nodiscard]] double shareOf(const SparseVolume& volume) const;
-  [[nodiscard]] bool hasPlateau() const { return plateau_.share >= kTuning.plateauShare; }
+  [[nodiscard]] bool hasPlateau() const;
   [[nodiscard]] double price() const;
   [[nodiscard]] double boundOf(const Setting& setting) const;
-  [[nodiscard]] VoxelLayer layerOf(const SparseVolume& volume, const Setting& setting,
-                                   std::uint64_t* tooMany = nullptr) const;
+  [[nodiscard]] ThriftyLayer layerOf(const SparseVolume& volume, const Setting& setting,
+                                     bool isSized = false) const;
   [[nodiscard]] double psnrOn(const SparseVolume& volume, const VoxelLayer& layer) const;
   [[nodiscard]] Tried tried(const SparseVolume& volume, const Setting& setting) const;
   [[nodiscard]] double shareOfBytes(const SparseVolume& volume, double bound) const;
@@ -96,26 +85,27 @@ class VoxelSearch {
   [[nodiscard]] std::optional<Tried> coarsest(const SparseVolume& volume, double psnr,
                                               const Setting& first, int mostTrials,
                                               double tolerance) const;
-  [[nodiscard]] std::optional<Tried> fewestLevels(double psnr, const Setting& first) const;
+  [[nodiscard]] std::optional<Tried> fewestLevels(const SparseVolume& volume, const Setting& first,
+                                                  int mostTrials, double tolerance) const;
+  [[nodiscard]] double levelsOf(const Setting& setting) const;
   [[nodiscard]] std::optional<Tried> thriftyForPsnr(const Tried& plain) const;
   [[nodiscard]] std::optional<Tried> sized(const SparseVolume& volume,
                                            const Setting& setting) const;
   [[nodiscard]] std::optional<Tried> fullest(const SparseVolume& volume,
                                              const Setting& first) const;
   [[nodiscard]] VoxelCandidate candidateOf(Tried tried) const;
-  [[nodiscard]] std::optional<Tried> withPlateau(const SparseVolume& volume, Setting setting) const;
   [[nodiscard]] std::optional<VoxelCandidate> finished();
 
   [[nodiscard]] std::uint64_t exactBytes() const;
   void matchJudge();
   void trySettings();
-  [[nodiscard]] bool exactIsBest();
   void tryForPsnr();
   void tryForSize();
-  void decidePlateau(std::optional<Tried> with);
+  void considerPlateau(std::optional<Tried> with);
 
   const Job& job_;
-  Goal goal_;
+  Aim goal_;
+  std::size_t sampleBricks_;
   Box box_;
   double peak_ = 0.0;
   SparseVolume sample_;        ///< empty if the sample is the whole volume
@@ -130,8 +120,6 @@ class VoxelSearch {
   bool hasTried_ = false;
   std::optional<Tried> best_;           ///< the best setting on the sample
   std::optional<std::uint64_t> exact_;  ///< bytes of exact voxels, if they may be the better ones
-  std::optional<Candidate> tooLarge_;
-  PlateauChoice plateauChoice_;
   double seconds_ = 0.0;
 };
 
@@ -147,11 +135,14 @@ class VoxelSearch {
 /// "Estimating the bytes of exact voxels", are 0.94 to 1.08 times the true bytes of volumes without
 /// symmetry. A sample hardly contains mirror images and copies of bricks; with them, the estimate may be
 /// nine times the true bytes.
-[[nodiscard]] Candidate estimateExactVoxels(const Job& job);
+[[nodiscard]] Candidate estimateExactVoxels(const Job& job,
+                                            std::size_t sampleBricks = kBricksOfSample);
 
-/// About so many bricks of a volume at their positions, in runs of 64 at equal distances; the whole volume
-/// if it has no more. The bricks of a run follow each other in the order in which voxels are coded, so
-/// that most of them are neighbours.
+/// The numbers, increasing, of about so many of more bricks, in runs of 64 at equal distances. The bricks of a run follow
+/// each other in the order in which voxels are coded, so that most of them are neighbours.
+[[nodiscard]] std::vector<std::size_t> sampledBricks(const std::vector<Coord>& bricks,
+                                                     std::size_t count);
+/// These bricks of a volume at their positions; the whole volume if it has no more.
 [[nodiscard]] SparseVolume sampleOf(const SparseVolume& volume, std::size_t bricks);
 
 /// How voxels store the active mask of a grid: as StorageOptions say, but exactly for a level set,

@@ -207,4 +207,25 @@ double averageHits(const Field& field) {
   return total.voxels > 0 ? double(total.pairs) / double(total.voxels) : 0.0;
 }
 
+double evaluateReference(const Field& field, Coord voxel) {
+  double value = field.background;
+  for (const Chunk& chunk : field.chunks) {
+    const Ellipsoids& e = chunk.ellipsoids;
+    for (std::size_t i = 0; i < e.size(); ++i) {
+      const double d[3] = {double(voxel.x) - chunk.origin.x - e.center[0][i],
+                           double(voxel.y) - chunk.origin.y - e.center[1][i],
+                           double(voxel.z) - chunk.origin.z - e.center[2][i]};
+      const auto k = kernelConstants<double>(field.kernel, kappaOf(field, e, i));
+      const Matrix3 L = unitFrame(e, i);
+      double m = 0.0;  // |L d|^2
+      for (int r = 0; r < 3; ++r) {
+        const double u = L[3 * r] * d[0] + L[3 * r + 1] * d[1] + L[3 * r + 2] * d[2];
+        m += u * u;
+      }
+      value += double(e.intensity[i]) * kernelPhi(k, m);
+    }
+  }
+  return value;
+}
+
 }  // namespace esvr

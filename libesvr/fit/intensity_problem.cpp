@@ -26,7 +26,7 @@ std::vector<Coord> knownCorners(const IntensityTarget& target) {
 }
 
 const float* sourceValues(const SparseVolume& source, Coord corner) {
-  const auto at = findBrick(source, brickOf(corner - source.origin));
+  const auto at = brickWith(source, corner);
   return at ? source.brickValues(*at).data() : nullptr;
 }
 

@@ -33,6 +33,8 @@ static_assert(std::endian::native == std::endian::little,
 /// Writes values as little-endian bytes.
 class ByteWriter {
  public:
+  static constexpr bool kReads = false;
+
   template <class T>
   requires std::is_arithmetic_v<T>
   void put(T value) { putAll(std::span<const T>(&value, 1)); }
@@ -70,6 +72,8 @@ class ByteWriter {
 /// Reads little-endian values from bytes, and never past their end.
 class ByteReader {
  public:
+  static constexpr bool kReads = true;
+
   /// \param where  start of every error text: "file: section"
   ByteReader(std::span<const std::byte> bytes, std::string where)
       : bytes_(bytes), where_(std::move(where)) {}
@@ -134,6 +138,55 @@ class ByteReader {
   std::string where_;
   std::size_t at_ = 0;
 };
+
+// One description of a record serves both sides: code...(side, value) writes the value to a ByteWriter, or reads it from a
+// ByteReader, so that they cannot differ.
+
+template <class Side, class T>
+using Coded = std::conditional_t<Side::kReads, T, const T>;
+
+template <class T>
+void code(ByteWriter& out, const T& value) {
+  out.put(value);
+}
+template <class T>
+void code(ByteReader& in, T& value) {
+  value = in.get<T>();
+}
+
+/// A number that the file has in another type. A reader need not check its range.
+template <class Stored, class T>
+void codeAs(ByteWriter& out, const T& value) {
+  out.put(static_cast<Stored>(value));
+}
+template <class Stored, class T>
+void codeAs(ByteReader& in, T& value) {
+  value = static_cast<T>(in.get<Stored>());
+}
+
+/// An enumeration in one byte. A reader refuses what is above `last`.
+template <class Enum>
+void codeEnum(ByteWriter& out, const Enum& value, Enum /*last*/, const char* /*what*/) {
+  out.put(static_cast<std::uint8_t>(value));
+}
+template <class Enum>
+void codeEnum(ByteReader& in, Enum& value, Enum last, const char* what) {
+  value = in.getEnum(last, what);
+}
+inline void codeFlag(ByteWriter& out, const bool& value, const char* /*what*/) {
+  out.put(std::uint8_t(value));
+}
+inline void codeFlag(ByteReader& in, bool& value, const char* what) {
+  value = in.getEnum(std::uint8_t{1}, what) != 0;
+}
+
+/// A length in 32 bits, and as many bytes.
+template <class Bytes>
+void codeSized(ByteWriter& out, const Bytes& value) {
+  out.putSized(value);
+}
+inline void codeSized(ByteReader& in, std::string& value) { value = in.getString(); }
+inline void codeSized(ByteReader& in, std::vector<std::byte>& value) { value = in.getBlob(); }
 
 // Varints: unsigned integers in as few bytes as they need, with 7 bits a byte, the lowest first. The highest bit of a
 // byte says that another one follows.

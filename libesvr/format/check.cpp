@@ -113,13 +113,10 @@ class GapCheck {
     faults_.push_back({std::nullopt, fault.what()});
   }
 
-  void checkZero(std::uint64_t begin, std::uint64_t end) {
-    const auto bytes = source_.read(begin, end - begin);
-    const auto isZero = [](std::byte b) { return b == std::byte{}; };
-    if (!std::ranges::all_of(bytes, isZero))
-      faults_.push_back({std::nullopt, source_.name() + ": a byte between " +
-                                           std::to_string(begin) + " and " + std::to_string(end) +
-                                           " belongs to no part and is not zero"});
+  void checkZero(std::uint64_t begin, std::uint64_t end) try {
+    format::checkZero(source_, begin, end);
+  } catch (const BadInput& fault) {
+    faults_.push_back({std::nullopt, fault.what()});
   }
 
   const ByteSource& source_;

@@ -28,11 +28,6 @@ namespace format {
 
 namespace {
 
-bool meet(const Box& a, const Box& b) {
-  const Coord low = maxCoord(a.min, b.min), high = minCoord(a.max, b.max);
-  return low.x <= high.x && low.y <= high.y && low.z <= high.z;
-}
-
 bool encloses(const Box& outer, const Box& inner) {
   return inner.empty() || (outer.contains(inner.min) && outer.contains(inner.max));
 }
@@ -75,14 +70,35 @@ class GridDecoder {
     DecodedGrid decoded = readRecords();
     StoredGrid& grid = decoded.grid;
     readChunks(grid);
-    if (grid.topology == TopologyKind::kBricks) readBricks(grid);
     if (grid.topology == TopologyKind::kMask) readMask(grid);
-    readVoxels(grid);
-    readRelated(before, grid);
-    readResidual(grid);
+    if (grid.topology == TopologyKind::kBricks)
+      ifThere(SectionKind::kBricks, [&](const Content& content, const std::string& where) {
+        grid.bricks = getBricks(content, where);
+      });
+    ifThere(SectionKind::kVoxels, [&](const Content& content, const std::string& where) {
+      grid.voxels = getVoxels(content, where, sections_.budget());
+    });
+    ifThere(SectionKind::kRelated, [&](const Content& content, const std::string& where) {
+      if (grid.voxels) throw BadInput(where + ": the grid has two sets of voxels");
+      getRelated(content, where, before, sections_.budget(), grid);
+    });
+    // A residual corrects the sum of all layers.
+    if (layers_ == kAllLayers)
+      ifThere(SectionKind::kResidual, [&](const Content& content, const std::string& where) {
+        grid.residual = getVoxels(content, where, sections_.budget());
+        refuse(residualFaultOf(grid));
+      });
     getNonFinite(sections_, g_, previous_, grid);
-    readLayerErrors(grid);
-    readCurve(grid);
+    // The errors of layers hold for whole grids only.
+    if (!part_ || !part_->box)
+      ifThere(SectionKind::kLayerErrors, [&](const Content& content, const std::string& where) {
+        grid.layerErrors = getLayerErrors(content, layersInFile_, where);
+        grid.layerErrors.resize(layerCount(grid));
+      });
+    if (!part_)
+      ifThere(SectionKind::kCurve, [&](const Content& content, const std::string& where) {
+        grid.curve = getCurve(content, where);
+      });
     return decoded;
   }
 
@@ -129,7 +145,7 @@ class GridDecoder {
     if (content.size() != count * kChunkRecordBytes)
       in.fail("not a table of " + counted(count, "chunk"));
     std::vector<ChunkRecord> records;
-    for (std::uint32_t c = 0; c < count; ++c) records.push_back(getChunk(in));
+    for (std::uint32_t c = 0; c < count; ++c) codeChunk(in, records.emplace_back());
     return records;
   }
 
@@ -147,7 +163,7 @@ class GridDecoder {
   }
 
   [[nodiscard]] bool wanted(const Box& box) const {
-    return !part_ || !part_->box || meet(box, *part_->box);
+    return !part_ || !part_->box || !common(box, *part_->box).empty();
   }
 
   void readChunks(StoredGrid& grid) {
@@ -254,12 +270,6 @@ class GridDecoder {
     return dequantise(quantised);
   }
 
-  void readBricks(StoredGrid& grid) {
-    const auto section = id(SectionKind::kBricks);
-    if (sections_.has(section))
-      grid.bricks = getBricks(sections_.get(section), sections_.place(section));
-  }
-
   void readMask(StoredGrid& grid) {
     const auto section = id(SectionKind::kMask);
     Mask mask = getMask(sections_.get(section), sections_.place(section), sections_.budget());
@@ -267,41 +277,13 @@ class GridDecoder {
     grid.mask = std::move(mask.active);
   }
 
-  void readVoxels(StoredGrid& grid) {
-    const auto section = id(SectionKind::kVoxels);
-    if (sections_.has(section))
-      grid.voxels = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
-  }
+  using Content = std::vector<std::byte>;
 
-  void readRelated(std::span<const StoredGrid> before, StoredGrid& grid) {
-    const auto section = id(SectionKind::kRelated);
-    if (!sections_.has(section)) return;
-    if (grid.voxels) throw BadInput(sections_.place(section) + ": the grid has two sets of voxels");
-    getRelated(sections_.get(section), sections_.place(section), before, sections_.budget(), grid);
-  }
-
-  /// Reads the residual, unless only some of the layers are read: it corrects the sum of all
-  /// layers.
-  void readResidual(StoredGrid& grid) {
-    const auto section = id(SectionKind::kResidual);
-    if (!sections_.has(section) || layers_ != kAllLayers) return;
-    grid.residual = getVoxels(sections_.get(section), sections_.place(section), sections_.budget());
-    refuse(residualFaultOf(grid));
-  }
-
-  /// Reads the errors of the layers that were read. They hold for whole grids only, not for a box.
-  void readLayerErrors(StoredGrid& grid) {
-    const auto section = id(SectionKind::kLayerErrors);
-    if (!sections_.has(section) || (part_ && part_->box)) return;
-    grid.layerErrors =
-        getLayerErrors(sections_.get(section), layersInFile_, sections_.place(section));
-    grid.layerErrors.resize(layerCount(grid));
-  }
-
-  void readCurve(StoredGrid& grid) {
-    const auto section = id(SectionKind::kCurve);
-    if (sections_.has(section) && !part_)
-      grid.curve = getCurve(sections_.get(section), sections_.place(section));
+  /// Calls read(content, where) for a section of the grid, if there is one. \param read  `where` begins error texts
+  template <class Read>
+  void ifThere(SectionKind kind, const Read& read) {
+    const auto section = id(kind);
+    if (sections_.has(section)) read(sections_.get(section), sections_.place(section));
   }
 
   static constexpr std::size_t kAllLayers = std::numeric_limits<std::size_t>::max();
@@ -327,7 +309,8 @@ std::vector<MetaItem> readFileMetadata(SectionReader& sections) {
   if (!sections.has(section)) return {};
   const auto content = sections.get(section);
   ByteReader in(content, sections.place(section));
-  auto items = getMetadata(in);
+  std::vector<MetaItem> items;
+  codeMetadata(in, items);
   in.finish();
   return items;
 }
@@ -339,7 +322,8 @@ CarriedGrid readCarriedGrid(SectionReader& sections, std::uint32_t number, Carri
   const SectionId record{SectionKind::kCarried, number};
   const auto content = sections.get(record);
   ByteReader in(content, sections.place(record));
-  CarriedGrid grid = getCarried(in);
+  CarriedGrid grid;
+  codeCarried(in, grid);
   in.finish();
   const SectionId stored{SectionKind::kCarriedBytes, number};
   if (bytes == CarriedBytes::kAll) grid.bytes = sections.getCarried(stored);

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "codec/voxel_coder.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -161,7 +162,7 @@ std::vector<Coord> withResidualBricks(const StoredGrid& grid, const RevoxeliseOp
 void addResidual(const VoxelLayer& residual, SparseVolume& volume) {
   for (std::size_t r = 0; r < residual.bricks.size(); ++r) {
     const Coord corner = residual.origin + residual.bricks[r] * kBrickSide;
-    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    const auto b = brickWith(volume, corner);
     if (!b) continue;
     for (std::size_t v = 0; v < kBrickVoxels; ++v) {
       float& value = volume.brickValues(*b)[v];
@@ -267,23 +268,13 @@ void settleInactive(float background, SparseVolume& volume) {
   });
 }
 
-/// The layer's voxels in some bricks.
-VoxelLayer partOf(const VoxelLayer& layer, std::span<const Coord> chosen) {
-  VoxelLayer part;
-  part.form = layer.form;
-  part.divisor = layer.divisor;
-  part.palette = layer.palette;
-  part.origin = layer.origin;
-  part.background = layer.background;
-  for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
-    if (!std::ranges::binary_search(chosen, layer.origin + layer.bricks[b] * kBrickSide)) continue;
-    part.bricks.push_back(layer.bricks[b]);
-    part.active.push_back(layer.active[b]);
-    part.vacant.push_back(layer.vacant[b]);
-    const auto first = layer.codes.begin() + std::ptrdiff_t(b * kBrickVoxels);
-    part.codes.insert(part.codes.end(), first, first + kBrickVoxels);
-  }
-  return part;
+/// The layer's voxels in bricks with these corners, increasing.
+VoxelLayer partAt(const VoxelLayer& layer, std::span<const Coord> corners) {
+  std::vector<std::size_t> chosen;
+  for (std::size_t b = 0; b < layer.bricks.size(); ++b)
+    if (std::ranges::binary_search(corners, layer.origin + layer.bricks[b] * kBrickSide))
+      chosen.push_back(b);
+  return codec::partOf(layer, chosen);
 }
 
 void requirePossible(const StoredGrid& grid, const DecodeOptions& options) {
@@ -298,7 +289,7 @@ void requirePossible(const StoredGrid& grid, const DecodeOptions& options) {
 SparseVolume decodedPart(const StoredGrid& grid, const DecodeOptions& options,
                          const ChosenBricks& chosen) {
   SparseVolume volume = !grid.voxels ? evaluated(grid, options, chosen)
-                        : chosen     ? volumeOf(partOf(*grid.voxels, *chosen))
+                        : chosen     ? volumeOf(partAt(*grid.voxels, *chosen))
                                      : volumeOf(*grid.voxels);
   if (grid.voxels && grid.tone.isOn() && !isExact(grid)) applyTone(format::ruleOf(grid), volume);
   if (grid.voxels && options.box) clip(*options.box, format::ruleOf(grid), volume);
@@ -360,18 +351,11 @@ SparseVolume format::decodeBricks(const StoredGrid& grid, const DecodeOptions& o
 
 VectorGrid decodeVector(const std::string& name, StoredComponents components,
                         const DecodeOptions& options) {
-  VectorGrid vectors;
-  vectors.descriptor = components.front().descriptor;
-  vectors.descriptor.name = name;
-  DecodeOptions left = options;
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    vectors.background[c] = components[c].descriptor.background;
-    vectors.components[c] = decodeGrid(components[c], left);
-    const std::uint64_t bytes = vectors.components[c].values.size() * sizeof(float);
-    if (left.maxBytes != kNoMemoryLimit && !left.memory.isInFile(bytes))
-      left.maxBytes -= std::min(left.maxBytes, bytes);
-  }
-  return vectors;
+  return format::vectorsOf(name, components, options,
+                           [](const StoredGrid& component, const DecodeOptions& left) {
+                             return VolumeGrid{.descriptor = component.descriptor,
+                                               .volume = decodeGrid(component, left)};
+                           });
 }
 
 }  // namespace esvr

@@ -101,58 +101,46 @@ namespace {
 constexpr int kMaxOffset = 1 << 20;  // limit on offsets of bits, for sums in 32 bits
 constexpr int kMaxSlope = 1 << 12;
 
-int getWithin(ByteReader& in, int limit, const char* what) {
-  const auto n = in.get<std::int32_t>();
-  if (n < -limit || n > limit) in.fail(std::string(what) + " of the lattice is out of range");
-  return n;
+template <class Side>
+void codeWithin(Side& side, Coded<Side, int>& n, int limit, const char* what) {
+  codeAs<std::int32_t>(side, n);
+  if constexpr (Side::kReads)
+    if (n < -limit || n > limit) side.fail(std::string(what) + " of the lattice is out of range");
 }
 
-double getStep(ByteReader& in, const char* what) {
-  const auto step = in.get<double>();
-  if (!(std::isfinite(step) && step > 0.0))
-    in.fail(std::string(what) + " of the lattice is not a positive number");
-  return step;
+template <class Side>
+void codeStep(Side& side, Coded<Side, double>& step, const char* what) {
+  code(side, step);
+  if constexpr (Side::kReads)
+    if (!(std::isfinite(step) && step > 0.0))
+      side.fail(std::string(what) + " of the lattice is not a positive number");
+}
+
+template <class Side>
+void codeLattice(Side& side, Coded<Side, Lattice>& l) {
+  codeStep(side, l.cell, "the cell");
+  codeCoord(side, l.lowestCell);
+  codeStep(side, l.scaleStep, "the step of scales");
+  code(side, l.lowestScale);
+  codeStep(side, l.intensityStep, "the step of intensities");
+  codeWithin(side, l.positionBase, kMaxOffset, "the base of positions");
+  codeWithin(side, l.positionSlope, kMaxSlope, "the slope of positions");
+  codeWithin(side, l.scaleOffset, kMaxOffset, "the offset of scales");
+  codeWithin(side, l.intensityBase, kMaxOffset, "the base of intensities");
+  codeWithin(side, l.intensitySlope, kMaxSlope, "the slope of intensities");
+  codeWithin(side, l.rotationOffset, kMaxOffset, "the offset of rotations");
+  codeAs<std::uint8_t>(side, l.cellBits);
+  codeFlag(side, l.signedIntensity, "mark of signs");
+  auto ratios = std::uint8_t(l.rotationFrom.size());
+  code(side, ratios);
+  if constexpr (Side::kReads) {
+    if (l.cellBits > Lattice::kMaxCellBits) side.fail("the lattice has too many cells");
+    l.rotationFrom.resize(ratios);
+  }
+  for (auto& from : l.rotationFrom) code(side, from);
 }
 
 }  // namespace
-
-void putLattice(ByteWriter& out, const Lattice& l) {
-  out.put(l.cell);
-  for (const auto low : {l.lowestCell.x, l.lowestCell.y, l.lowestCell.z}) out.put(low);
-  out.put(l.scaleStep);
-  out.put(l.lowestScale);
-  out.put(l.intensityStep);
-  for (const int n : {l.positionBase, l.positionSlope, l.scaleOffset, l.intensityBase,
-                      l.intensitySlope, l.rotationOffset})
-    out.put(std::int32_t(n));
-  out.put(std::uint8_t(l.cellBits));
-  out.put(std::uint8_t(l.signedIntensity));
-  out.put(std::uint8_t(l.rotationFrom.size()));
-  out.putAll(l.rotationFrom);
-}
-
-Lattice getLattice(ByteReader& in) {
-  Lattice l;
-  l.cell = getStep(in, "the cell");
-  l.lowestCell.x = in.get<std::int32_t>();
-  l.lowestCell.y = in.get<std::int32_t>();
-  l.lowestCell.z = in.get<std::int32_t>();
-  l.scaleStep = getStep(in, "the step of scales");
-  l.lowestScale = in.get<std::int32_t>();
-  l.intensityStep = getStep(in, "the step of intensities");
-  l.positionBase = getWithin(in, kMaxOffset, "the base of positions");
-  l.positionSlope = getWithin(in, kMaxSlope, "the slope of positions");
-  l.scaleOffset = getWithin(in, kMaxOffset, "the offset of scales");
-  l.intensityBase = getWithin(in, kMaxOffset, "the base of intensities");
-  l.intensitySlope = getWithin(in, kMaxSlope, "the slope of intensities");
-  l.rotationOffset = getWithin(in, kMaxOffset, "the offset of rotations");
-  l.cellBits = in.get<std::uint8_t>();
-  if (l.cellBits > Lattice::kMaxCellBits) in.fail("the lattice has too many cells");
-  l.signedIntensity = in.getEnum(std::uint8_t{1}, "mark of signs") != 0;
-  l.rotationFrom.resize(in.get<std::uint8_t>());
-  for (auto& from : l.rotationFrom) from = in.get<std::uint8_t>();
-  return l;
-}
 
 // ---- Blocks
 
@@ -492,7 +480,7 @@ void decodeBlocks(ByteReader& in, QuantisedEllipsoids& q) {
 std::vector<std::byte> putEllipsoids(const QuantisedEllipsoids& q) {
   ByteWriter out;
   out.put(std::uint64_t(q.size()));
-  putLattice(out, q.lattice);
+  codeLattice(out, q.lattice);
   const auto blocks = encodeBlocks(q);
   for (const auto& block : blocks)
     for (const auto& stream : block) out.put(std::uint32_t(stream.size()));
@@ -508,7 +496,7 @@ QuantisedEllipsoids getEllipsoids(std::span<const std::byte> content, std::uint6
   const auto stored = in.get<std::uint64_t>();
   checkCount(in, stored, count, content.size());
   QuantisedEllipsoids q;
-  q.lattice = getLattice(in);
+  codeLattice(in, q.lattice);
   q.resize(count);
   decodeBlocks(in, q);
   in.finishZeros();
@@ -560,7 +548,7 @@ std::vector<std::byte> putDirectory(const QuantisedEllipsoids& q, const Box& chu
                                     std::span<const BlockStreams> blocks) {
   ByteWriter out;
   out.put(std::uint64_t(q.size()));
-  putLattice(out, q.lattice);
+  codeLattice(out, q.lattice);
   out.put(std::uint8_t(q.layerEnds.size()));
   for (const std::size_t end : q.layerEnds) out.put(std::uint64_t(end));
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -691,7 +679,7 @@ BlockDirectory getDirectory(const ByteSource& section, const ChunkRecord& chunk)
   checkCount(in, in.get<std::uint64_t>(), chunk.count, section.size());
   if (chunk.box.empty()) in.fail("the chunk's box is empty");
   BlockDirectory directory;
-  directory.lattice = getLattice(in);
+  codeLattice(in, directory.lattice);
   directory.layerEnds = getLayerEnds(in, chunk.count);
   directory.blocks =
       getEntries(in, directory, chunk, sizeof(std::uint32_t) + bytes.size() + kChecksumBytes);

@@ -35,13 +35,6 @@ struct Run {
 /// and is the same on every machine, so that a reader can check the stored box against it.
 [[nodiscard]] Box centerBox(const Chunk& chunk, Run run);
 
-// ---- The lattice
-
-void putLattice(ByteWriter& out, const Lattice& lattice);
-
-/// \throws BadInput  a step is not positive, or a number of bits is out of range
-[[nodiscard]] Lattice getLattice(ByteReader& in);
-
 // ---- Blocks
 
 /// Blocks are decoded one without the other. Those of layers are smaller, so that a box needs fewer

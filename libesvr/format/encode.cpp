@@ -134,7 +134,7 @@ SortedGrid sorted(const StoredGrid& grid) {
 void addFileMetadata(SectionWriter& out, const EsvrFile& file) {
   if (file.metadata.empty()) return;
   ByteWriter content;
-  putMetadata(content, file.metadata);
+  codeMetadata(content, file.metadata);
   out.add({SectionKind::kFileMetadata}, kRequired, content.take());
 }
 
@@ -153,7 +153,7 @@ void addGrid(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
 void addChunkTable(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
   if (grid.records.size() < 2) return;
   ByteWriter content;
-  for (const auto& record : grid.records) putChunk(content, record);
+  for (const auto& record : grid.records) codeChunk(content, record);
   out.add({SectionKind::kChunks, g}, kRequired, content.take());
 }
 
@@ -207,7 +207,6 @@ void addRelated(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid>
   out.addRaw({SectionKind::kRelated, g}, kRequired, std::move(*content));
 }
 
-/// \param grids  those of the file
 void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> grids) {
   const StoredGrid& grid = grids[g];
   if (grid.topology == TopologyKind::kMask)
@@ -242,7 +241,7 @@ void addCarriedRecords(SectionWriter& out, const std::vector<CarriedGrid>& grids
                        std::size_t first) {
   for (std::size_t c = 0; c < grids.size(); ++c) {
     ByteWriter content;
-    putCarried(content, grids[c]);
+    codeCarried(content, grids[c]);
     out.add({SectionKind::kCarried, std::uint32_t(first + c)}, kOptional, content.take());
   }
 }

@@ -50,7 +50,6 @@ void putSizes(ByteWriter& out, const SectionEntry& row) {
   if (row.codec != Codec::kRaw) putVarint(out, row.rawBytes);
 }
 
-/// Reads the tables of a frame.
 class FrameReader {
  public:
   FrameReader(std::span<const std::byte> bytes, const std::string& name)

@@ -100,7 +100,6 @@ struct ThresholdChoice {
   double iou = 0.0;  ///< intersection over union of the active voxels of source and result
 };
 
-/// The voxels by their activity.
 class Histogram {
  public:
   void add(const VoxelRule& rule, float value, float wanted, bool active) {
@@ -158,10 +157,9 @@ class Histogram {
   std::vector<Tally> bins_ = std::vector<Tally>(kBins);
 };
 
-/// Adds the voxels of a brick that lie in a box.
 void addBrick(const SparseVolume& source, const VoxelRule& rule, const Box& box, Coord corner,
               std::span<const float> values, Histogram& histogram) {
-  const auto b = findBrick(source, brickOf(corner - source.origin));
+  const auto b = brickWith(source, corner);
   const BrickMask inBox = maskOf(box, corner);
   for (int v = 0; v < kBrickVoxels; ++v) {
     if (!inBox.test(v)) continue;
@@ -201,12 +199,6 @@ ThresholdChoice chooseThreshold(const SparseVolume& source, const StoredGrid& gr
 // ---- The active voxels
 
 namespace {
-
-std::vector<Coord> brickCorners(const SparseVolume& volume) {
-  std::vector<Coord> corners(volume.brickCount());
-  for (std::size_t b = 0; b < corners.size(); ++b) corners[b] = volume.brickCorner(b);
-  return corners;
-}
 
 /// Lets the values decide which voxels are active. \return false if they restore none
 bool storeThreshold(const SparseVolume& source, StoredGrid& grid) {

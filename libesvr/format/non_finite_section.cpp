@@ -118,7 +118,6 @@ NonFiniteCounts countsOf(const VoxelLayer& layer) {
 
 namespace {
 
-/// True if a palette has 0 and increasing numbers of kinds.
 bool isPaletteOfKinds(const std::vector<float>& palette) {
   const auto isKind = [](float value) {
     return value == 0.0f || value == 1.0f || value == 2.0f || value == 3.0f;
@@ -198,7 +197,7 @@ std::vector<Coord> lackingIn(const SparseVolume& volume, const VoxelLayer& layer
   for (std::size_t b = 0; b < layer.bricks.size(); ++b) {
     const Coord corner = cornerOfKinds(layer, b);
     if (!isChosen(place, corner)) continue;
-    if (findBrick(volume, brickOf(corner) - brickOf(volume.origin))) continue;
+    if (brickWith(volume, corner)) continue;
     for (int v = 0; v < kBrickVoxels; ++v)
       if (layer.active[b].test(v) && place.box.contains(corner + voxelLocal(v))) {
         lacking.push_back(corner);
@@ -222,27 +221,18 @@ void addLacking(const std::vector<Coord>& lacking, bool isLevelSet, SparseVolume
   if (lacking.empty()) return;
   std::optional<EmptySigns> signs;
   if (isLevelSet && volume.brickCount() > 0 && volume.background > 0.0f) signs.emplace(volume);
-  std::vector<Coord> corners = lacking;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) corners.push_back(volume.brickCorner(b));
+  std::vector<Coord> corners = brickCorners(volume);
+  corners.insert(corners.end(), lacking.begin(), lacking.end());
   std::ranges::sort(corners);
   Box box;
   for (const Coord corner : corners) box.expand(corner);
   requireNear(box);
-  SparseVolume wide;
-  wide.background = volume.background;
-  wide.origin = box.min;
-  wide.values =
-      VoxelArray<float>(corners.size() * kBrickVoxels, volume.background, memoryOf(volume));
-  wide.active.resize(corners.size());
-  for (std::size_t b = 0; b < corners.size(); ++b) {
-    wide.bricks.push_back(brickOf(corners[b]) - brickOf(wide.origin));
-    if (const auto own = findBrick(volume, brickOf(corners[b]) - brickOf(volume.origin))) {
-      std::ranges::copy(volume.brickValues(*own), wide.brickValues(b).begin());
+  SparseVolume wide = withBricks(volume, corners);
+  for (std::size_t b = 0; b < corners.size(); ++b)
+    if (const auto own = brickWith(volume, corners[b]))
       wide.active[b] = volume.active[*own];
-    } else if (signs && signs->isInside(brickOf(corners[b]))) {
+    else if (signs && signs->isInside(brickOf(corners[b])))
       std::ranges::fill(wide.brickValues(b), -volume.background);
-    }
-  }
   volume = std::move(wide);
 }
 
@@ -257,7 +247,7 @@ void restoreNonFinite(const StoredGrid& grid, const NonFinitePlace& place, NonFi
                volume);
   for (std::size_t l = 0; l < layer.bricks.size(); ++l) {
     const Coord corner = cornerOfKinds(layer, l);
-    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    const auto b = brickWith(volume, corner);
     if (!b || !isChosen(place, corner)) continue;
     for (int v = 0; v < kBrickVoxels; ++v) {
       if (!layer.active[l].test(v) || !place.box.contains(corner + voxelLocal(v))) continue;

@@ -17,69 +17,31 @@ namespace esvr::format {
 
 namespace {
 
-template <class Enum>
-void putEnum(ByteWriter& out, Enum value) {
-  out.put(static_cast<std::uint8_t>(value));
+template <class Side>
+void codeBox(Side& side, Coded<Side, Box>& box) {
+  codeCoord(side, box.min);
+  codeCoord(side, box.max);
 }
 
-bool getBool(ByteReader& in, const char* what) {
-  enum class Bool { kFalse, kTrue };
-  return in.getEnum(Bool::kTrue, what) == Bool::kTrue;
+template <class Side>
+void codeTransform(Side& side, Coded<Side, Transform>& transform) {
+  codeSized(side, transform.mapType);
+  codeSized(side, transform.map);
+  bool isAffine = transform.affine.has_value();
+  codeFlag(side, isAffine, "mark of an affine map");
+  if (!isAffine) return;
+  if constexpr (Side::kReads) transform.affine.emplace();
+  for (auto& m : *transform.affine) code(side, m);
 }
 
-void putCoord(ByteWriter& out, Coord c) {
-  for (const auto v : {c.x, c.y, c.z}) out.put(v);
-}
-Coord getCoord(ByteReader& in) {
-  Coord c;
-  for (auto* v : {&c.x, &c.y, &c.z}) *v = in.get<std::int32_t>();
-  return c;
-}
-
-void putBox(ByteWriter& out, const Box& box) {
-  putCoord(out, box.min);
-  putCoord(out, box.max);
-}
-Box getBox(ByteReader& in) {
-  Box box;
-  box.min = getCoord(in);
-  box.max = getCoord(in);
-  return box;
-}
-
-void putTransform(ByteWriter& out, const Transform& transform) {
-  out.putSized(transform.mapType);
-  out.putSized(transform.map);
-  putEnum(out, transform.affine.has_value());
-  if (transform.affine) out.putAll(*transform.affine);
-}
-Transform getTransform(ByteReader& in) {
-  Transform transform;
-  transform.mapType = in.getString();
-  transform.map = in.getBlob();
-  if (!getBool(in, "mark of an affine map")) return transform;
-  transform.affine.emplace();
-  for (double& m : *transform.affine) m = in.get<double>();
-  return transform;
-}
-
-void putDescriptor(ByteWriter& out, const GridDescriptor& d) {
-  out.putSized(d.name);
-  putEnum(out, d.gridClass);
-  putEnum(out, d.valueType);
-  out.put(d.background);
-  putTransform(out, d.transform);
-  putMetadata(out, d.metadata);
-}
-GridDescriptor getDescriptor(ByteReader& in) {
-  GridDescriptor d;
-  d.name = in.getString();
-  d.gridClass = in.getEnum(GridClass::kStaggered, "grid class");
-  d.valueType = in.getEnum(ValueType::kDouble, "value type");
-  d.background = in.get<double>();
-  d.transform = getTransform(in);
-  d.metadata = getMetadata(in);
-  return d;
+template <class Side>
+void codeDescriptor(Side& side, Coded<Side, GridDescriptor>& d) {
+  codeSized(side, d.name);
+  codeEnum(side, d.gridClass, GridClass::kStaggered, "grid class");
+  codeEnum(side, d.valueType, ValueType::kDouble, "value type");
+  code(side, d.background);
+  codeTransform(side, d.transform);
+  codeMetadata(side, d.metadata);
 }
 
 // Added to the number of a topology.
@@ -89,17 +51,21 @@ constexpr std::uint8_t kHasBoxVoxels = 8;   // the record has StoredGrid::boxVox
 constexpr std::uint8_t kHasTone = 16;       // the record has StoredGrid::tone
 constexpr std::uint8_t kHasNonFinite = 32;  // the record has StoredGrid::nonFinite
 
-void putTopology(ByteWriter& out, const StoredGrid& grid) {
+/// What else a record has, by the number of its topology.
+std::uint8_t topologyOf(const StoredGrid& grid) {
   unsigned topology = unsigned(grid.topology);
   if (grid.farBackground) topology += kFarBackground;
   if (!grid.boxVoxels.empty()) topology += kHasBoxVoxels;
   if (grid.tone.isOn()) topology += kHasTone;
   if (grid.nonFinite.total() > 0) topology += kHasNonFinite;
-  out.put(std::uint8_t(topology));
+  return std::uint8_t(topology);
 }
 
-/// \return the byte, which says what else the record has
-std::uint8_t getTopology(ByteReader& in, StoredGrid& grid) {
+std::uint8_t codeTopology(ByteWriter& out, const StoredGrid& grid) {
+  out.put(topologyOf(grid));
+  return topologyOf(grid);
+}
+std::uint8_t codeTopology(ByteReader& in, StoredGrid& grid) {
   const auto topology = in.get<std::uint8_t>();
   const bool isKnown =
       topology < 2 * kHasNonFinite && topology % kTopologies <= std::uint8_t(TopologyKind::kMask);
@@ -109,17 +75,15 @@ std::uint8_t getTopology(ByteReader& in, StoredGrid& grid) {
   return topology;
 }
 
-/// Writes voxels by their distances from the lowest corner of the active box.
-void putBoxVoxels(ByteWriter& out, const StoredGrid& grid) {
-  if (grid.boxVoxels.empty()) return;
-  out.put(std::uint8_t(grid.boxVoxels.size()));
-  for (const Coord voxel : grid.boxVoxels)
+/// Box voxels by their distances from the lowest corner of the active box.
+void codeBoxVoxels(ByteWriter& out, const Box& box, const std::vector<Coord>& voxels) {
+  out.put(std::uint8_t(voxels.size()));
+  for (const Coord voxel : voxels)
     for (const auto axis : kAxes)
-      putVarint(out, std::uint64_t(std::int64_t{voxel.*axis} - grid.activeBox.min.*axis));
+      putVarint(out, std::uint64_t(std::int64_t{voxel.*axis} - box.min.*axis));
 }
-
-std::vector<Coord> getBoxVoxels(ByteReader& in, const Box& box) {
-  std::vector<Coord> voxels(in.get<std::uint8_t>());
+void codeBoxVoxels(ByteReader& in, const Box& box, std::vector<Coord>& voxels) {
+  voxels.resize(in.get<std::uint8_t>());
   if (voxels.empty()) in.fail("a list of box voxels without any");
   for (Coord& voxel : voxels)
     for (const auto axis : kAxes) {
@@ -128,123 +92,90 @@ std::vector<Coord> getBoxVoxels(ByteReader& in, const Box& box) {
         in.fail("a box voxel lies outside the bounding box");
       voxel.*axis = std::int32_t(std::int64_t{box.min.*axis} + std::int64_t(distance));
     }
-  return voxels;
-}
-
-void putNonFiniteCounts(ByteWriter& out, const NonFiniteCounts& counts) {
-  if (counts.total() == 0) return;
-  for (const std::uint64_t count : {counts.nan, counts.plusInfinity, counts.minusInfinity})
-    putVarint(out, count);
 }
 
 /// \param most  the number of active voxels
-NonFiniteCounts getNonFiniteCounts(ByteReader& in, std::uint64_t most) {
-  NonFiniteCounts counts;
-  for (auto* const count : {&counts.nan, &counts.plusInfinity, &counts.minusInfinity}) {
-    *count = getVarint(in);
-    if (*count > most) in.fail("more voxels that are not finite than active ones");
-    most -= *count;
-  }
-  if (counts.total() == 0) in.fail("a mark of voxels that are not finite without any");
-  return counts;
+template <class Side>
+void codeNonFiniteCounts(Side& side, std::uint64_t most, Coded<Side, NonFiniteCounts>& counts) {
+  for (auto* const count : {&counts.nan, &counts.plusInfinity, &counts.minusInfinity})
+    if constexpr (Side::kReads) {
+      *count = getVarint(side);
+      if (*count > most) side.fail("more voxels that are not finite than active ones");
+      most -= *count;
+    } else {
+      putVarint(side, *count);
+    }
+  if constexpr (Side::kReads)
+    if (counts.total() == 0) side.fail("a mark of voxels that are not finite without any");
 }
 
-void putVoxelFacts(ByteWriter& out, const StoredGrid& grid) {
-  putTopology(out, grid);
-  putEnum(out, grid.withinRange);
-  out.put(grid.activeThreshold);
-  putBox(out, grid.activeBox);
-  putBoxVoxels(out, grid);
-  if (grid.tone.isOn()) out.put(grid.tone.scale);
-  out.put(grid.activeVoxels);
-  putNonFiniteCounts(out, grid.nonFinite);
-  out.put(grid.valueMin);
-  out.put(grid.valueMax);
-}
-void getVoxelFacts(ByteReader& in, StoredGrid& grid) {
-  const std::uint8_t has = getTopology(in, grid);
-  grid.withinRange = getBool(in, "mark of a range of values");
-  grid.activeThreshold = in.get<float>();
-  grid.activeBox = getBox(in);
-  if (has & kHasBoxVoxels) grid.boxVoxels = getBoxVoxels(in, grid.activeBox);
-  if (has & kHasTone) {
-    grid.tone.scale = in.get<float>();
-    if (!grid.tone.isOn()) in.fail("the scale of its tone curve is not above 0");
-  }
-  grid.activeVoxels = in.get<std::uint64_t>();
-  if (has & kHasNonFinite) grid.nonFinite = getNonFiniteCounts(in, grid.activeVoxels);
-  grid.valueMin = in.get<float>();
-  grid.valueMax = in.get<float>();
+template <class Side>
+void codeVoxelFacts(Side& side, Coded<Side, StoredGrid>& grid) {
+  const std::uint8_t has = codeTopology(side, grid);
+  codeFlag(side, grid.withinRange, "mark of a range of values");
+  code(side, grid.activeThreshold);
+  codeBox(side, grid.activeBox);
+  if (has & kHasBoxVoxels) codeBoxVoxels(side, grid.activeBox, grid.boxVoxels);
+  if (has & kHasTone) code(side, grid.tone.scale);
+  if constexpr (Side::kReads)
+    if ((has & kHasTone) && !grid.tone.isOn())
+      side.fail("the scale of its tone curve is not above 0");
+  code(side, grid.activeVoxels);
+  if (has & kHasNonFinite) codeNonFiniteCounts(side, grid.activeVoxels, grid.nonFinite);
+  code(side, grid.valueMin);
+  code(side, grid.valueMax);
 }
 
-void putKernel(ByteWriter& out, const Kernel& kernel) {
-  putEnum(out, kernel.form);
-  out.put(kernel.kappa);
-  out.put(kernel.epsilon);
-}
-Kernel getKernel(ByteReader& in) {
-  Kernel kernel;
-  kernel.form = in.getEnum(KernelForm::kPaper, "kernel");
-  kernel.kappa = in.get<float>();
-  kernel.epsilon = in.get<float>();
-  return kernel;
+/// A grid without its chunks.
+template <class Side>
+void codeFacts(Side& side, Coded<Side, StoredGrid>& grid) {
+  codeDescriptor(side, grid.descriptor);
+  codeVoxelFacts(side, grid);
+  code(side, grid.field.background);
+  Coded<Side, Kernel>& kernel = grid.field.kernel;
+  codeEnum(side, kernel.form, KernelForm::kPaper, "kernel");
+  code(side, kernel.kappa);
+  code(side, kernel.epsilon);
 }
 
 }  // namespace
 
-void putMetadata(ByteWriter& out, const std::vector<MetaItem>& items) {
-  out.put(std::uint32_t(items.size()));
-  for (const auto& item : items) {
-    out.putSized(item.name);
-    out.putSized(item.type);
-    out.putSized(item.value);
+template <class Side>
+void codeMetadata(Side& side, Coded<Side, std::vector<MetaItem>>& items) {
+  auto count = std::uint32_t(items.size());
+  code(side, count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    // Memory is not reserved for the stored count, because it is checked only by reading the items.
+    if constexpr (Side::kReads) items.emplace_back();
+    auto& item = items[i];
+    codeSized(side, item.name);
+    codeSized(side, item.type);
+    codeSized(side, item.value);
   }
 }
+template void codeMetadata<ByteWriter>(ByteWriter&, const std::vector<MetaItem>&);
+template void codeMetadata<ByteReader>(ByteReader&, std::vector<MetaItem>&);
 
-std::vector<MetaItem> getMetadata(ByteReader& in) {
-  std::vector<MetaItem> items;
-  // Memory is not reserved for the stored count, because the count is checked only by reading the
-  // items.
-  for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
-    auto& item = items.emplace_back();
-    item.name = in.getString();
-    item.type = in.getString();
-    item.value = in.getBlob();
-  }
-  return items;
+template <class Side>
+void codeChunk(Side& side, Coded<Side, ChunkRecord>& chunk) {
+  codeCoord(side, chunk.origin);
+  codeBox(side, chunk.box);
+  code(side, chunk.count);
 }
-
-void putChunk(ByteWriter& out, const ChunkRecord& chunk) {
-  putCoord(out, chunk.origin);
-  putBox(out, chunk.box);
-  out.put(chunk.count);
-}
-
-ChunkRecord getChunk(ByteReader& in) {
-  ChunkRecord chunk;
-  chunk.origin = getCoord(in);
-  chunk.box = getBox(in);
-  chunk.count = in.get<std::uint64_t>();
-  return chunk;
-}
+template void codeChunk<ByteWriter>(ByteWriter&, const ChunkRecord&);
+template void codeChunk<ByteReader>(ByteReader&, ChunkRecord&);
 
 void putGrid(ByteWriter& out, const StoredGrid& grid, const std::vector<ChunkRecord>& chunks) {
-  putDescriptor(out, grid.descriptor);
-  putVoxelFacts(out, grid);
-  out.put(grid.field.background);
-  putKernel(out, grid.field.kernel);
+  codeFacts(out, grid);
   out.put(std::uint32_t(chunks.size()));
-  if (chunks.size() == 1) putChunk(out, chunks.front());
+  if (chunks.size() == 1) codeChunk(out, chunks.front());
 }
 
 GridRecord getGrid(ByteReader& in) {
   GridRecord record;
-  record.grid.descriptor = getDescriptor(in);
-  getVoxelFacts(in, record.grid);
-  record.grid.field.background = in.get<float>();
-  record.grid.field.kernel = getKernel(in);
-  record.chunkCount = in.get<std::uint32_t>();
-  if (record.chunkCount == 1) record.chunks.push_back(getChunk(in));
+  codeFacts(in, record.grid);
+  code(in, record.chunkCount);
+  if (record.chunkCount == 1) codeChunk(in, record.chunks.emplace_back());
   return record;
 }
 
@@ -309,26 +240,17 @@ StoredGrid getRecordAfter(ByteReader& in, const StoredGrid& previous, const std:
 
 // ---- Carried grids
 
-void putCarried(ByteWriter& out, const CarriedGrid& grid) {
-  out.putSized(grid.name);
-  out.putSized(grid.treeType);
-  out.put(std::uint8_t(grid.savedAsHalf));
-  out.put(grid.vdbVersion);
-  out.put(grid.place);
-  out.put(grid.blocksAt);
+template <class Side>
+void codeCarried(Side& side, Coded<Side, CarriedGrid>& grid) {
+  codeSized(side, grid.name);
+  codeSized(side, grid.treeType);
+  codeFlag(side, grid.savedAsHalf, "mark of half floats");
+  code(side, grid.vdbVersion);
+  code(side, grid.place);
+  code(side, grid.blocksAt);
 }
-
-CarriedGrid getCarried(ByteReader& in) {
-  enum class SavedAsHalf { kNo, kYes };
-  CarriedGrid grid;
-  grid.name = in.getString();
-  grid.treeType = in.getString();
-  grid.savedAsHalf = in.getEnum(SavedAsHalf::kYes, "mark of half floats") == SavedAsHalf::kYes;
-  grid.vdbVersion = in.get<std::uint32_t>();
-  grid.place = in.get<std::uint32_t>();
-  grid.blocksAt = in.get<std::uint64_t>();
-  return grid;
-}
+template void codeCarried<ByteWriter>(ByteWriter&, const CarriedGrid&);
+template void codeCarried<ByteReader>(ByteReader&, CarriedGrid&);
 
 // ---- The curve of a fit
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry.h"
 #include "esvr/container.h"
 #include "esvr/ellipsoids.h"
 #include "esvr/grid.h"
@@ -32,11 +33,18 @@ struct GridRecord {
   std::vector<ChunkRecord> chunks;  ///< a single chunk's record; empty if there are more
 };
 
-void putMetadata(ByteWriter& out, const std::vector<MetaItem>& items);
-[[nodiscard]] std::vector<MetaItem> getMetadata(ByteReader& in);
+// The sides of code...() are ByteWriter and ByteReader (bytes.h).
 
-void putChunk(ByteWriter& out, const ChunkRecord& chunk);
-[[nodiscard]] ChunkRecord getChunk(ByteReader& in);
+template <class Side>
+void codeCoord(Side& side, Coded<Side, Coord>& c) {
+  for (const auto axis : kAxes) code(side, c.*axis);
+}
+
+template <class Side>
+void codeMetadata(Side& side, Coded<Side, std::vector<MetaItem>>& items);
+
+template <class Side>
+void codeChunk(Side& side, Coded<Side, ChunkRecord>& chunk);
 
 void putGrid(ByteWriter& out, const StoredGrid& grid, const std::vector<ChunkRecord>& chunks);
 [[nodiscard]] GridRecord getGrid(ByteReader& in);
@@ -52,8 +60,8 @@ void putRecordAfter(ByteWriter& out, const StoredGrid& grid, const StoredGrid& p
 
 // ---- The record of a carried grid: everything but its bytes
 
-void putCarried(ByteWriter& out, const CarriedGrid& grid);
-[[nodiscard]] CarriedGrid getCarried(ByteReader& in);
+template <class Side>
+void codeCarried(Side& side, Coded<Side, CarriedGrid>& grid);
 
 // ---- The curve of a fit as the content of a section: one array for each quantity
 

@@ -183,19 +183,6 @@ class TableCheck {
   const SectionTable& table_;
 };
 
-void checkZero(const ByteSource& source, std::uint64_t begin, std::uint64_t end) {
-  constexpr std::uint64_t kPiece = 1 << 16;
-  for (; begin < end; begin += std::min(kPiece, end - begin)) {
-    const auto bytes = source.read(begin, std::min(kPiece, end - begin));
-    const auto at =
-        std::find_if(bytes.begin(), bytes.end(), [](auto b) { return b != std::byte{}; });
-    if (at != bytes.end())
-      throw BadInput(source.name() + ": byte " +
-                     std::to_string(begin + std::uint64_t(at - bytes.begin())) +
-                     " belongs to no section and is not zero");
-  }
-}
-
 }  // namespace
 
 void checkTable(const std::string& file, const SectionTable& table) {
@@ -205,6 +192,19 @@ void checkTable(const std::string& file, const SectionTable& table) {
 
 void checkRows(const std::string& file, const SectionTable& table) {
   TableCheck(file, table).checkRows();
+}
+
+void checkZero(const ByteSource& source, std::uint64_t begin, std::uint64_t end) {
+  constexpr std::uint64_t kPiece = 1 << 16;
+  for (; begin < end; begin += std::min(kPiece, end - begin)) {
+    const auto bytes = source.read(begin, std::min(kPiece, end - begin));
+    const auto at =
+        std::find_if(bytes.begin(), bytes.end(), [](auto b) { return b != std::byte{}; });
+    if (at != bytes.end())
+      throw BadInput(source.name() + ": byte " +
+                     std::to_string(begin + std::uint64_t(at - bytes.begin())) +
+                     " belongs to no part and is not zero");
+  }
 }
 
 void checkGaps(const ByteSource& source, const SectionTable& table) {
@@ -220,31 +220,19 @@ void checkGaps(const ByteSource& source, const SectionTable& table) {
 
 namespace {
 
-/// The header's content.
 struct Header {
   std::uint16_t versionMajor = 0, versionMinor = 0;
   std::uint32_t sections = 0;
   std::uint64_t fileBytes = 0, tableOffset = 0, tableChecksum = 0;
 };
 
-void putEntry(ByteWriter& out, const SectionEntry& e) {
-  out.put(static_cast<std::uint32_t>(e.id.kind));
-  out.put(static_cast<std::uint16_t>(e.codec));
-  out.put(e.flags);
-  for (const auto index : {e.id.grid, e.id.chunk, e.id.frame, e.id.layer}) out.put(index);
-  for (const auto size : {e.offset, e.storedBytes, e.rawBytes, e.checksum}) out.put(size);
-}
-
-SectionEntry getEntry(ByteReader& in) {
-  SectionEntry e;
-  e.id.kind = static_cast<SectionKind>(in.get<std::uint32_t>());
-  e.codec = static_cast<Codec>(in.get<std::uint16_t>());
-  e.flags = in.get<std::uint16_t>();
-  for (auto* index : {&e.id.grid, &e.id.chunk, &e.id.frame, &e.id.layer})
-    *index = in.get<std::uint32_t>();
-  for (auto* size : {&e.offset, &e.storedBytes, &e.rawBytes, &e.checksum})
-    *size = in.get<std::uint64_t>();
-  return e;
+template <class Side>
+void codeEntry(Side& side, Coded<Side, SectionEntry>& e) {
+  codeAs<std::uint32_t>(side, e.id.kind);
+  codeAs<std::uint16_t>(side, e.codec);
+  code(side, e.flags);
+  for (auto* index : {&e.id.grid, &e.id.chunk, &e.id.frame, &e.id.layer}) code(side, *index);
+  for (auto* size : {&e.offset, &e.storedBytes, &e.rawBytes, &e.checksum}) code(side, *size);
 }
 
 void checkMagic(const ByteSource& source) {
@@ -333,7 +321,7 @@ std::string placeOf(const std::string& file, const SectionTable& table, std::siz
 
 std::vector<std::byte> encodeTable(const SectionTable& table) {
   ByteWriter rows;
-  for (const auto& e : table.entries) putEntry(rows, e);
+  for (const auto& e : table.entries) codeEntry(rows, e);
 
   ByteWriter out;
   out.putAll(kMagic);
@@ -357,7 +345,7 @@ SectionTable readTable(const ByteSource& source) {
   if (checksum(rows) != h.tableChecksum) in.fail("checksum does not match");
 
   SectionTable table{h.versionMajor, h.versionMinor, h.fileBytes, h.tableOffset, {}, false};
-  for (std::uint32_t i = 0; i < h.sections; ++i) table.entries.push_back(getEntry(in));
+  for (std::uint32_t i = 0; i < h.sections; ++i) codeEntry(in, table.entries.emplace_back());
   checkTable(source.name(), table);
   return table;
 }

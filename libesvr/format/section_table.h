@@ -157,7 +157,9 @@ void checkTable(const std::string& file, const SectionTable& table);
 /// Refuses what checkTable() refuses besides the places of the sections. \throws BadInput
 void checkRows(const std::string& file, const SectionTable& table);
 
-/// Refuses bytes that belong to no section and are not zero. \throws BadInput
+/// Refuses bytes of a range that are not zero, since they belong to no part of the file. \throws BadInput
+void checkZero(const ByteSource& source, std::uint64_t begin, std::uint64_t end);
+/// Refuses such bytes that belong to no section. \throws BadInput
 void checkGaps(const ByteSource& source, const SectionTable& table);
 
 // ---- Codecs (docs/format.md, "Codecs")

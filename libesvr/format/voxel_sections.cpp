@@ -32,14 +32,14 @@ bool validSuccessor(Coord corner, const Coord* previous) {
   return localOf(corner) == Coord{} && (!previous || *previous < corner);
 }
 
-}  // namespace
-
 void requireBricks(std::span<const Coord> corners) {
   for (std::size_t i = 0; i < corners.size(); ++i)
     if (!validSuccessor(corners[i], i == 0 ? nullptr : &corners[i - 1]))
       throw RuntimeFailure("brick corner " + toString(corners[i]) +
                            " is not a multiple of 8 or not above the one before it");
 }
+
+}  // namespace
 
 std::vector<std::byte> putBricks(std::span<const Coord> corners) {
   requireBricks(corners);
@@ -142,12 +142,34 @@ int bitsOf(const std::vector<Coord>& bricks) {
   return bits;
 }
 
-/// Refuses codes that have no value.
-void checkCodes(const VoxelLayer& layer, const ByteReader& in) {
-  if (layer.form != VoxelForm::kPalette) return;
-  for (const auto code : layer.codes)
-    if (code < 0 || std::uint32_t(code) >= layer.palette.size())
-      in.fail("a voxel is not in the palette");
+/// Largest number of bricks that a section may have without a previous frame, so that a reader knows it before it
+/// allocates memory.
+std::uint64_t maxBricksIn(std::uint64_t bytes) {
+  return kMaxBricksPerByte * bytes + kMaxBricksPerByte - 1;
+}
+
+/// The number of bytes that a section needs for bricks that the previous frame has not.
+std::uint64_t bytesForBricks(std::uint64_t bricks) {
+  return (bricks + kMaxBricksPerByte - 1) / kMaxBricksPerByte;
+}
+
+/// Refuses bricks that reach out of the index space.
+void checkBricks(const VoxelLayer& layer, const ByteReader& in) {
+  const auto beyond = [](std::int32_t origin, std::int32_t brick) {
+    return std::int64_t(origin) + std::int64_t(brick + 1) * kBrickSide - 1 > Box::kMax;
+  };
+  for (const Coord b : layer.bricks)
+    if (beyond(layer.origin.x, b.x) || beyond(layer.origin.y, b.y) || beyond(layer.origin.z, b.z))
+      in.fail("a brick of voxels lies outside the index space");
+}
+
+/// Refuses codes without a value, and values that are not finite.
+void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
+  if (layer.form == VoxelForm::kPalette)
+    for (const auto code : layer.codes)
+      if (code < 0 || std::uint32_t(code) >= layer.palette.size())
+        in.fail("a voxel is not in the palette");
+  if (!allFinite(layer)) in.fail("a voxel is not finite");
 }
 
 void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelLayer& layer) {
@@ -158,24 +180,45 @@ void setBricks(std::span<const std::uint64_t> keys, const ByteReader& in, VoxelL
   checkBricks(layer, in);
 }
 
-void putModel(ByteWriter& out, const codec::VoxelModel& model) {
-  out.put(model.vacantCode);
-  for (const auto mirror : model.mirror) out.put(mirror);
-  out.put(std::uint8_t(model.common.size()));
-  out.putAll(model.common);
+template <class Side>
+void codeModel(Side& side, Coded<Side, codec::VoxelModel>& model) {
+  code(side, model.vacantCode);
+  for (auto& mirror : model.mirror) {
+    code(side, mirror);
+    if constexpr (Side::kReads)
+      if (mirror < codec::VoxelModel::kNoMirror) side.fail("a mirror of voxels");
+  }
+  auto common = std::uint8_t(model.common.size());
+  code(side, common);
+  if constexpr (Side::kReads) {
+    if (common > codec::VoxelModel::kMaxCommon) side.fail("too many common voxels");
+    model.common.resize(common);
+  }
+  for (auto& voxel : model.common) code(side, voxel);
 }
 
-codec::VoxelModel getModel(ByteReader& in) {
-  codec::VoxelModel model;
-  model.vacantCode = in.get<std::int32_t>();
-  for (auto& mirror : model.mirror) {
-    mirror = in.get<std::int32_t>();
-    if (mirror < codec::VoxelModel::kNoMirror) in.fail("a mirror of voxels");
+template <class Side>
+void codeDivisor(Side& side, Coded<Side, double>& divisor) {
+  code(side, divisor);
+  if constexpr (Side::kReads)
+    if (!(std::isfinite(divisor) && divisor > 0.0)) side.fail("the divisor of voxels");
+}
+
+template <class Side>
+void codeHead(Side& side, Coded<Side, VoxelLayer>& layer) {
+  codeEnum(side, layer.form, VoxelForm::kPalette, "form of voxels");
+  codeDivisor(side, layer.divisor);
+  codeCoord(side, layer.origin);
+  code(side, layer.background);
+  auto values = std::uint32_t(layer.palette.size());
+  code(side, values);
+  if constexpr (Side::kReads) {
+    if (localOf(layer.origin) != Coord{}) side.fail("the origin of voxels is not a brick's corner");
+    if (!std::isfinite(layer.background)) side.fail("the background of voxels is not finite");
+    if (values > side.left() / sizeof(float)) side.fail("ends within the palette of voxels");
+    layer.palette.resize(values);
   }
-  model.common.resize(in.get<std::uint8_t>());
-  if (model.common.size() > codec::VoxelModel::kMaxCommon) in.fail("too many common voxels");
-  for (auto& code : model.common) code = in.get<std::int32_t>();
-  return model;
+  for (auto& value : layer.palette) code(side, value);
 }
 
 struct BrickCount {
@@ -239,68 +282,6 @@ void decodeStreams(ByteReader& in, const BrickCount& count, const codec::VoxelMo
   }
 }
 
-}  // namespace
-
-void putVoxelHead(ByteWriter& out, const VoxelLayer& layer) {
-  out.put(std::uint8_t(layer.form));
-  out.put(layer.divisor);
-  for (const auto at : {layer.origin.x, layer.origin.y, layer.origin.z}) out.put(at);
-  out.put(layer.background);
-  out.put(std::uint32_t(layer.palette.size()));
-  out.putAll(layer.palette);
-}
-
-double getDivisor(ByteReader& in) {
-  const auto divisor = in.get<double>();
-  if (!(std::isfinite(divisor) && divisor > 0.0)) in.fail("the divisor of voxels");
-  return divisor;
-}
-
-VoxelLayer getVoxelHead(ByteReader& in) {
-  VoxelLayer layer;
-  layer.form = in.getEnum(VoxelForm::kPalette, "form of voxels");
-  layer.divisor = getDivisor(in);
-  layer.origin.x = in.get<std::int32_t>();
-  layer.origin.y = in.get<std::int32_t>();
-  layer.origin.z = in.get<std::int32_t>();
-  if (localOf(layer.origin) != Coord{}) in.fail("the origin of voxels is not a brick's corner");
-  layer.background = in.get<float>();
-  if (!std::isfinite(layer.background)) in.fail("the background of voxels is not finite");
-  const auto values = in.get<std::uint32_t>();
-  if (values > in.left() / sizeof(float)) in.fail("ends within the palette of voxels");
-  layer.palette.resize(values);
-  for (float& value : layer.palette) value = in.get<float>();
-  return layer;
-}
-
-std::uint64_t maxBricksIn(std::uint64_t bytes) {
-  return kMaxBricksPerByte * bytes + kMaxBricksPerByte - 1;
-}
-
-std::uint64_t bytesForBricks(std::uint64_t bricks) {
-  return (bricks + kMaxBricksPerByte - 1) / kMaxBricksPerByte;
-}
-
-void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
-  budget.take(double(bricks) * decodedBytesPerBrick(bricks, budget.voxels()), where);
-}
-
-void checkBricks(const VoxelLayer& layer, const ByteReader& in) {
-  const auto beyond = [](std::int32_t origin, std::int32_t brick) {
-    return std::int64_t(origin) + std::int64_t(brick + 1) * kBrickSide - 1 > Box::kMax;
-  };
-  for (const Coord b : layer.bricks)
-    if (beyond(layer.origin.x, b.x) || beyond(layer.origin.y, b.y) || beyond(layer.origin.z, b.z))
-      in.fail("a brick of voxels lies outside the index space");
-}
-
-void checkVoxels(const VoxelLayer& layer, const ByteReader& in) {
-  checkCodes(layer, in);
-  if (!allFinite(layer)) in.fail("a voxel is not finite");
-}
-
-namespace {
-
 std::vector<std::byte> code(const VoxelLayer& layer) {
   const int bits = bitsOf(layer.bricks);
   codec::VoxelModel model = codec::chooseModel(layer);
@@ -311,10 +292,10 @@ std::vector<std::byte> code(const VoxelLayer& layer) {
     if (other.size() < stream.size()) stream = std::move(other), model = plain;
   }
   ByteWriter out;
-  putVoxelHead(out, layer);
+  codeHead(out, layer);
   out.put(std::uint64_t(layer.bricks.size()));
   out.put(std::uint8_t(bits));
-  putModel(out, model);
+  codeModel(out, model);
   out.putAll(stream);
   out.padTo(std::max<std::uint64_t>(out.size(), bytesForBricks(layer.bricks.size())));
   return out.take();
@@ -323,7 +304,7 @@ std::vector<std::byte> code(const VoxelLayer& layer) {
 /// The checksum of all members of a layer that its section depends on.
 std::uint64_t checksumOf(const VoxelLayer& layer) {
   ByteWriter head;
-  putVoxelHead(head, layer);
+  codeHead(head, layer);
   RunningChecksum sum;
   sum.add(head.take());
   const auto add = [&](const auto& all) {
@@ -338,6 +319,10 @@ std::uint64_t checksumOf(const VoxelLayer& layer) {
 
 }  // namespace
 
+void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
+  budget.take(double(bricks) * decodedBytesPerBrick(bricks, budget.voxels()), where);
+}
+
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
   const CodedVoxels& coded = layer.coded;
   const bool isCoded = coded.section && coded.checksum == checksumOf(layer);
@@ -350,22 +335,16 @@ std::uint64_t keepCoded(VoxelLayer& layer) {
   return layer.coded.section->size();
 }
 
-bool takeMore(const VoxelLayer& layer, std::uint64_t bytes) {
-  const auto takesMore = [&](const codec::VoxelModel& model) {
-    return codec::codeWithin(model, bytes, layer).bytes > bytes;
-  };
-  const codec::VoxelModel model = codec::chooseModel(layer);
-  return takesMore(model) && (!codec::hasMirror(model) || takesMore(codec::withoutMirrors(model)));
-}
-
 VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                      MemoryBudget& budget) {
   ByteReader in(content, where);
-  VoxelLayer layer = getVoxelHead(in);
+  VoxelLayer layer;
+  codeHead(in, layer);
   layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   const BrickCount count = getBrickCount(in, content.size());
   takeBricks(count.bricks, where, budget);
-  const codec::VoxelModel model = getModel(in);
+  codec::VoxelModel model;
+  codeModel(in, model);
   decodeStreams(in, count, model, layer);
   checkVoxels(layer, in);
   return layer;
@@ -377,7 +356,6 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
 
 namespace {
 
-/// The number of bricks that the context has not.
 std::uint64_t newBricks(const VoxelLayer& layer, const codec::PastVoxels& past) {
   return std::uint64_t(std::ranges::count_if(
       layer.bricks, [&](const Coord brick) { return past.find(brick) == BrickIndex::kNone; }));
@@ -435,21 +413,18 @@ bool hasVoxelsOnly(const StoredGrid& grid) {
 /// Writes the head of a layer, unless it is that of the previous frame.
 void putHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer& previous) {
   ByteWriter head, before;
-  putVoxelHead(head, layer);
-  putVoxelHead(before, previous);
+  codeHead(head, layer);
+  codeHead(before, previous);
   const bool same = std::ranges::equal(head.bytes(), before.bytes());
   out.put(std::uint8_t(same ? LayerHead::kSame : LayerHead::kOwn));
   if (!same) out.putAll(head.bytes());
 }
 
 VoxelLayer getHead(ByteReader& in, const VoxelLayer& previous) {
-  if (in.getEnum(LayerHead::kSame, "head of voxels") == LayerHead::kOwn) return getVoxelHead(in);
+  if (in.getEnum(LayerHead::kSame, "head of voxels") == LayerHead::kSame)
+    return codec::headOf(previous);
   VoxelLayer layer;
-  layer.form = previous.form;
-  layer.divisor = previous.divisor;
-  layer.palette = previous.palette;
-  layer.origin = previous.origin;
-  layer.background = previous.background;
+  codeHead(in, layer);
   return layer;
 }
 
@@ -548,18 +523,20 @@ void putRelatedHead(ByteWriter& out, const VoxelLayer& layer, const VoxelLayer* 
   if (shares)
     out.put(layer.divisor);
   else
-    putVoxelHead(out, layer);
+    codeHead(out, layer);
 }
 
 VoxelLayer getRelatedHead(ByteReader& in, const VoxelLayer* of) {
-  if (in.getEnum(RelatedHead::kDivisor, "head of voxels") == RelatedHead::kOwn)
-    return getVoxelHead(in);
-  if (!of) in.fail("a head of voxels without a reference");
   VoxelLayer layer;
+  if (in.getEnum(RelatedHead::kDivisor, "head of voxels") == RelatedHead::kOwn) {
+    codeHead(in, layer);
+    return layer;
+  }
+  if (!of) in.fail("a head of voxels without a reference");
   layer.form = VoxelForm::kQuantised;
   layer.origin = of->origin;
   layer.background = of->background;
-  layer.divisor = getDivisor(in);
+  codeDivisor(in, layer.divisor);
   return layer;
 }
 

@@ -24,9 +24,6 @@ inline constexpr int kMaxBrickBits = 21;
 // ---- Positions of bricks: one array for each axis
 
 /// \throws RuntimeFailure  the corners are not multiples of 8, or not increasing
-void requireBricks(std::span<const Coord> corners);
-
-/// \throws RuntimeFailure  as requireBricks
 [[nodiscard]] std::vector<std::byte> putBricks(std::span<const Coord> corners);
 
 /// \throws BadInput  the content is not a list of increasing corners; the text begins with `where`
@@ -56,36 +53,13 @@ struct Mask {
 /// Codes a layer and keeps its section in it. \return the bytes of the section
 std::uint64_t keepCoded(VoxelLayer& layer);
 
-/// True if the section takes more than a number of bytes. Coding stops where that is known.
-[[nodiscard]] bool takeMore(const VoxelLayer& layer, std::uint64_t bytes);
-
 /// \throws BadInput  the content is damaged; the text begins with `where`
 /// \throws MemoryExceeded  there are more bricks than the budget allows
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                                    MemoryBudget& budget);
 
-// The parts of a section of voxels that a predicted grid has too.
-
-/// The form, the divisor, the origin, the background and the palette.
-void putVoxelHead(ByteWriter& out, const VoxelLayer& layer);
-[[nodiscard]] VoxelLayer getVoxelHead(ByteReader& in);
-/// The divisor alone.
-[[nodiscard]] double getDivisor(ByteReader& in);
-
-/// Largest number of bricks that a section may have without a previous frame, so that a reader knows
-/// it before it allocates memory.
-[[nodiscard]] std::uint64_t maxBricksIn(std::uint64_t bytes);
-/// The number of bytes that a section needs for bricks that the previous frame has not.
-[[nodiscard]] std::uint64_t bytesForBricks(std::uint64_t bricks);
-
 /// Takes the memory of bricks while they are read from a budget.
 void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget);
-
-/// Refuses bricks that reach out of the index space.
-void checkBricks(const VoxelLayer& layer, const ByteReader& in);
-
-/// Refuses codes without a value, and values that are not finite.
-void checkVoxels(const VoxelLayer& layer, const ByteReader& in);
 
 // ---- A grid of voxels as its difference from the same grid of the previous frame
 

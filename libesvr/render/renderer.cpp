@@ -190,18 +190,4 @@ std::unique_ptr<Renderer> makeNanoRenderer(const NanoVolume& volume, const Devic
   return makeCpuRenderer([&volume](const RenderOptions& o) { return renderNano(volume, o); });
 }
 
-// The bricks of a field.
-
-void evaluateBricksOn(const Device& device, const Field& field, std::span<const Coord> corners,
-                      std::span<float> out) {
-  if (device.kind == DeviceKind::kCuda)
-    cuda::decodeBricks(device, field, corners, out);
-  else
-    evaluateBricks(field, corners, out);
-}
-
-Arithmetic arithmeticOf(const Device& device) {
-  return {.integerSums = device.kind == DeviceKind::kCuda};
-}
-
 }  // namespace esvr

@@ -194,9 +194,7 @@ VectorGrid colorsOf(const SplatDensity& density, const Field& field, const Volum
                     double voxelSize, const VoxelMemory& memory) {
   VectorGrid colors;
   describe("Cd", GridClass::kUnknown, voxelSize, colors.descriptor);
-  std::vector<Coord> corners;
-  for (std::size_t b = 0; b < grid.volume.brickCount(); ++b)
-    corners.push_back(grid.volume.brickCorner(b));
+  const std::vector<Coord> corners = brickCorners(grid.volume);
   for (std::size_t channel = 0; channel < kComponents; ++channel) {
     SparseVolume& volume = colors.components[channel];
     volume = revoxelise(density.timesColor(field, channel), {.bricks = corners,

@@ -132,7 +132,7 @@ SparseVolume layOutBricks(std::vector<Coord>& corners, const FillRules& rules,
 }
 
 std::size_t brickAt(const SparseVolume& volume, Coord corner) {
-  if (const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin))) return *b;
+  if (const auto b = brickWith(volume, corner)) return *b;
   throw BadInput("is damaged: there is no brick at " + toString(corner));
 }
 

@@ -235,7 +235,7 @@ SparseVolume readVolume(LeafReader<Tree>& reader, std::size_t component, const F
   topology.bricks = {};
   const LeafAccess<Leaf> access{component};
   reader.leaves(topology.leaves, [&](Coord corner, const Leaf& leaf) {
-    const auto b = findBrick(volume, brickOf(corner) - brickOf(volume.origin));
+    const auto b = brickWith(volume, corner);
     if (b.has_value() == leaf.valueMask().isOff())
       throw BadInput("is damaged: a leaf has two different masks");
     if (b)

@@ -50,9 +50,7 @@ struct NumberVoxels {
   [[nodiscard]] std::size_t count() const { return volume.brickCount(); }
   [[nodiscard]] Coord corner(std::size_t b) const { return volume.brickCorner(b); }
   [[nodiscard]] const BrickMask& active(std::size_t b) const { return volume.active[b]; }
-  [[nodiscard]] std::size_t find(Coord corner) const {
-    return findBrick(volume, brickOf(corner) - brickOf(volume.origin)).value();
-  }
+  [[nodiscard]] std::size_t find(Coord corner) const { return brickWith(volume, corner).value(); }
   [[nodiscard]] float value(std::size_t b, int i, int) const { return volume.brickValues(b)[i]; }
 };
 

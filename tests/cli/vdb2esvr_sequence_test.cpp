@@ -86,8 +86,8 @@ TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
   const Json range = Json::parse(run.out)["grids"][0]["psnr_t50"];
   // The bound of quantised voxels is found to within some hundredths of a dB, but the frames take some
   // 500 bytes, of which another lattice with a higher PSNR may save a few.
-  EXPECT_GE(range[0], presetPicturePsnr(Preset::kStandard));
-  EXPECT_LE(range[1], presetPicturePsnr(Preset::kStandard) + 6.0);
+  EXPECT_GE(range[0], qualityOf(Preset::kStandard).picturePsnr);
+  EXPECT_LE(range[1], qualityOf(Preset::kStandard).picturePsnr + 6.0);
   EXPECT_GT(sizeOf("out.0003.esvr"), sizeOf("out.0001.esvr"));
 }
 

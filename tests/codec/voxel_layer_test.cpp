@@ -27,6 +27,10 @@
 namespace esvr {
 namespace {
 
+double largestError(const SparseVolume& volume, const VoxelLayer& layer) {
+  return largestDifference(volume, volumeOf(layer));
+}
+
 /// A layer of one brick whose voxels have the codes from `first` on, all active.
 VoxelLayer layerFrom(VoxelForm form, std::int32_t first) {
   VoxelLayer layer;

@@ -25,6 +25,14 @@ using Names = std::vector<std::string>;
 using testing::ElementsAre;
 using testing::Optional;
 
+Names uniqueNames(const Names& names) {
+  const auto unique = GridNames(names).allUnique();
+  return {unique.begin(), unique.end()};
+}
+std::size_t findGrid(const Names& names, const std::string& wanted, const std::string& file = "") {
+  return GridNames(names).findWhole(wanted, file);
+}
+
 TEST(GridNames, AreNumberedOnlyWhereShared) {
   EXPECT_THAT(uniqueNames(Names{"a", "b", "a", ""}), ElementsAre("a[0]", "b", "a[1]", "(unnamed)"));
   EXPECT_THAT(uniqueNames(Names{"", ""}), ElementsAre("(unnamed)[0]", "(unnamed)[1]"));

@@ -207,6 +207,27 @@ TEST(FindBrick, FindsEveryBrickAndNoOther) {
   EXPECT_FALSE(findBrick(volume, {2, 0, 0}));
 }
 
+TEST(BrickWith, IsThatOfAVoxelAnywhereInIndexSpace) {
+  const Coord low{Box::kMin, Box::kMin, Box::kMin};
+  const SparseVolume volume =
+      makeVolume({brickWith(low, {}), brickWith(low + Coord{8, 0, 0}, {})}, 0.0f);
+  EXPECT_EQ(brickWith(volume, low + Coord{15, 7, 7}), std::size_t{1});
+  EXPECT_FALSE(brickWith(volume, low + Coord{16, 0, 0}));
+  // The difference of these voxels does not fit into 32 bits.
+  EXPECT_FALSE(brickWith(volume, Coord{Box::kMax, Box::kMax, Box::kMax}));
+}
+
+TEST(WithBricks, HasTheValuesOfTheOtherVolumeAndItsBackground) {
+  const SparseVolume volume = makeVolume({brickWith({8, 0, 0}, {})}, 0.25f);
+  const std::vector<Coord> corners{{0, 0, 0}, {8, 0, 0}};
+  const SparseVolume wide = withBricks(volume, corners);
+  checkInvariants(wide);
+  EXPECT_EQ(brickCorners(wide), corners);
+  EXPECT_EQ(activeVoxelCount(wide), 0u);
+  EXPECT_THAT(wide.brickValues(0), testing::Each(0.25f));
+  EXPECT_TRUE(std::ranges::equal(wide.brickValues(1), volume.brickValues(0)));
+}
+
 struct PeakCase {
   const char* what;
   ValueRange active;

@@ -12,6 +12,7 @@
 #include <string>
 #include <thread>
 
+#include "encode/rate_control.h"
 #include "encode/volumes.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
@@ -210,9 +211,9 @@ TEST(Cancellation, SlowEndsEveryPhaseOfALargeConversionWithinTwoSeconds) {
        }},
       {"choosing active voxels",
        [&](auto&) { (void)makeStoredGrid(descriptor, volume, fitted.field); }},
-      {"rate control", [&](auto&) { (void)compactGrid(grid, volume); }},
+      {"rate control", [&](auto&) { (void)encode::compactGrid(grid, volume); }},
       {"rate control for a size",
-       [&](auto&) { (void)compactGrid(grid, volume, {.bytes = 20'000}); }},
+       [&](auto&) { (void)encode::compactGrid(grid, volume, {.bytes = 20'000}); }},
       {"evaluating", [&](auto&) { (void)decodeGrid(grid); }},
       {"measuring", [&](auto&) { (void)compareVolumes(volume, decoded, {.ssim = true}); }},
       {"writing",

@@ -126,8 +126,8 @@ TEST(ChoiceForAPreset, SlowHasItsQualityOverTheActiveVoxels) {
     options.goal = PresetGoal{};
     options.fit.preset = preset;
     const Conversion conversion = convertVolume({{}, volume}, options);
-    EXPECT_GE(psnrOfActive(volume, conversion), presetPsnr(preset));
-    EXPECT_LE(psnrOfActive(volume, conversion), presetPsnr(preset) + 1.0);
+    EXPECT_GE(psnrOfActive(volume, conversion), qualityOf(preset).psnr);
+    EXPECT_LE(psnrOfActive(volume, conversion), qualityOf(preset).psnr + 1.0);
     EXPECT_GT(bytesAdded(conversion.grid), before);
     before = bytesAdded(conversion.grid);
   }
@@ -164,7 +164,7 @@ TEST(ChoiceForAPreset, CountsTheActiveVoxelsOfTheBox) {
   const double psnr =
       compareVolumes(volume, decodeGrid(conversion.grid), {.box = options.fit.box}).psnrBox;
   const double wider = 10.0 * std::log10(64.0 * 64.0 * 64.0 / double(activeVoxelCount(volume)));
-  EXPECT_GE(psnr, presetPsnr(options.fit.preset) + wider);
+  EXPECT_GE(psnr, qualityOf(options.fit.preset).psnr + wider);
 }
 
 TEST(ChoiceForAPreset, SlowStoresTheRepresentationThatIsInsistedOn) {

@@ -36,7 +36,7 @@ struct Searched {
   ConvertInput input{descriptor, volume};
   EllipsoidSearch search;
 
-  Searched(SparseVolume of, ConvertOptions with, const EllipsoidSearch::Goal& goal,
+  Searched(SparseVolume of, ConvertOptions with, const encode::Aim& goal,
            std::optional<encode::FitPoint> scout = {})
       : volume(std::move(of)),
         options(std::move(with)),
@@ -129,10 +129,12 @@ TEST(EllipsoidSearch, EndsWhereItsShortFitsAreCancelled) {
 }
 
 TEST(EllipsoidSearch, ForecastsWhatCannotWin) {
-  Searched noise(test::noiseVolume(3), ofIterations(60), {.psnr = 45.0, .below = 20000});
+  Searched noise(test::noiseVolume(3), ofIterations(60), {.psnr = 45.0});
+  noise.search.stayBelow(20000);
   noise.search.draft();
   EXPECT_FALSE(noise.search.mayStayBelow(20000));
-  Searched smooth(test::smoothVolume(), ofIterations(200), {.psnr = 35.0, .below = 100'000});
+  Searched smooth(test::smoothVolume(), ofIterations(200), {.psnr = 35.0});
+  smooth.search.stayBelow(100'000);
   smooth.search.draft();
   EXPECT_TRUE(smooth.search.mayStayBelow(100'000));
   EXPECT_GT(smooth.search.expectedBytes(), 0u);

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "../fit/volumes.h"
-#include "esvr/encode.h"
+#include "encode/rate_control.h"
 #include "esvr/fit.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -14,6 +14,8 @@
 
 namespace esvr {
 namespace {
+
+using encode::compactGrid;
 
 class CompactGridOnGpu : public test::OnGpu, public testing::WithParamInterface<bool> {
  protected:

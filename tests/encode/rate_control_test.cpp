@@ -20,6 +20,10 @@
 namespace esvr {
 namespace {
 
+using encode::compactGrid;
+using encode::CompactOptions;
+using encode::CompactResult;
+
 StoredGrid storedOf(StoredGrid grid, const encode::RateTrial& trial) {
   grid.field = trial.field;
   grid.quantised = trial.quantised;
@@ -45,7 +49,7 @@ struct Fitted {
 
 TEST(Trial, HasTheErrorOfItsVoxels) {
   const Fitted fitted;
-  encode::RateTrials maker(fitted.grid, {fitted.source, activeBox(fitted.source), {}});
+  encode::RateTrials maker(fitted.grid, fitted.source, {});
   const encode::RateTrial trial = maker.make({0.1, 0.1, 0.1, 0.1});
   const auto metrics = metricsOf(fitted.source, storedOf(fitted.grid, trial));
   const double squares = metrics.mseBox * metrics.boxVoxels;
@@ -54,7 +58,7 @@ TEST(Trial, HasTheErrorOfItsVoxels) {
 
 TEST(Trial, AmongSeveralIsTheSameAsAlone) {
   const Fitted fitted;
-  encode::RateTrials maker(fitted.grid, {fitted.source, activeBox(fitted.source), {}});
+  encode::RateTrials maker(fitted.grid, fitted.source, {});
   const QuantiserSteps steps[] = {{0.1, 0.1, 0.1, 0.1}, {0.05, 0.1, 0.2, 0.1}};
   const auto both = maker.make(steps);
   for (std::size_t k = 0; k < both.size(); ++k) {
@@ -71,7 +75,7 @@ TEST(Trial, KnowsTheErrorsOfItsLayers) {
   test::Random random(6);
   for (float& i : field.chunks[0].ellipsoids.intensity) i = float(std::exp(random(-6.0, -1.0)));
   const StoredGrid grid = makeStoredGrid({}, source, field, Activity::kByValue);
-  encode::RateTrials maker(grid, {source, activeBox(source), {}});
+  encode::RateTrials maker(grid, source, {});
   const encode::RateTrial trial = maker.make({0.1, 0.1, 0.1, 0.1});
   const StoredGrid stored = storedOf(grid, trial);
   const auto errors = maker.layerErrors(trial);

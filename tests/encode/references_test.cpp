@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "../fit/volumes.h"
+#include "encode/grids_of_file.h"
 #include "encode/volumes.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
@@ -15,6 +16,9 @@
 
 namespace esvr {
 namespace {
+
+using encode::chooseReference;
+using encode::expectedFrom;
 
 constexpr float kGain = 40.0f, kOffset = 300.0f;
 

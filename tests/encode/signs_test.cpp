@@ -31,6 +31,7 @@ namespace esvr {
 namespace {
 
 using encode::changeAcrossSurface;
+using encode::withSigns;
 using Distance = std::function<double(Coord)>;
 
 double toBall(Coord v) { return std::hypot(v.x - 23.5, v.y - 23.4, v.z - 23.3) - 15.0; }
@@ -271,7 +272,7 @@ TEST(Surface, IsKeptBesideMarkersOfAnySize) {
     ASSERT_FALSE(isNarrowBand(levelSet(volume), volume));
     const Conversion made = convertVolume({levelSet(volume), volume}, {.goal = PresetGoal{}});
     ASSERT_TRUE(made.surfaceBound);
-    const double bound = presetSurfaceBound(Preset::kStandard) * *changeAcrossSurface(volume);
+    const double bound = qualityOf(Preset::kStandard).surfaceBound * *changeAcrossSurface(volume);
     EXPECT_EQ(*made.surfaceBound, bound);
     EXPECT_LE(largestDifference(volume, decodeGrid(made.grid)), bound);
     EXPECT_EQ(compareSigns(volume, decodeGrid(made.grid)).voxels, 0u);

@@ -139,8 +139,8 @@ TEST(Tone, OfAPresetLimitsTheErrorOfValuesToo) {
   const SparseVolume volume = smoke();
   const Conversion made = shortlyFitted(volume, {.goal = PresetGoal{}});
   const VolumeMetrics m = compareVolumes(volume, decodeGrid(made.grid), {.transmittance = true});
-  EXPECT_GE(m.transmittance->psnr50, presetPicturePsnr(Preset::kStandard));
-  EXPECT_GE(m.psnrActive, presetPicturePsnr(Preset::kStandard) - 4.0);
+  EXPECT_GE(m.transmittance->psnr50, qualityOf(Preset::kStandard).picturePsnr);
+  EXPECT_GE(m.psnrActive, qualityOf(Preset::kStandard).picturePsnr - 4.0);
 }
 
 TEST(Tone, IsNotUsedWhereItDoesNotServe) {
@@ -282,6 +282,24 @@ TEST(Tone, OfAGivenScaleServesSignedValues) {
   EXPECT_EQ(made.grid.tone, ToneCurve{0.1f});
   EXPECT_FALSE(made.byPictures);
   EXPECT_GE(compareVolumes(volume, decodeGrid(made.grid)).psnrBox, 35.0);
+}
+
+TEST(Tone, LayersHaveTheErrorsOfTheBoxOfTheConversion) {
+  const SparseVolume volume = smoke();
+  ConvertOptions options{.goal = FitGoal{}, .tone = ToneCurve{0.3f}};
+  options.fit.box = Box{{8, 8, 8}, {23, 23, 23}};
+  options.fit.count = 3000;
+  options.representation = Representation::kEllipsoids;
+  options.fit.iterations = 40;
+  const StoredGrid grid = convertVolume({fog(), volume}, options).grid;
+  ASSERT_GE(layerCount(grid), 2u);
+  ASSERT_EQ(grid.layerErrors.size(), layerCount(grid));
+  for (std::size_t k = 1; k <= layerCount(grid); ++k) {
+    const auto metrics =
+        compareVolumes(volume, decodeGrid(firstLayers(grid, k)), {.box = options.fit.box});
+    EXPECT_EQ(grid.layerErrors[k - 1].psnrBox, float(metrics.psnrBox));
+    EXPECT_EQ(grid.layerErrors[k - 1].maxError, float(metrics.maxError));
+  }
 }
 
 TEST(Tone, ComesBackFromAFile) {

@@ -56,13 +56,12 @@ TEST_F(VoxelSearch, SaysWhichPsnrIsOutOfReachOfASize) {
   const std::uint64_t bytes = 4000;
   const double best = ofBytes(bytes)->psnr;
   encode::VoxelSearch search(job_, {.bytes = bytes});
-  EXPECT_TRUE(search.mayReach(best - 1.0));
-  EXPECT_FALSE(search.tooLarge());
-  EXPECT_FALSE(search.mayReach(best + 6.0));
-  ASSERT_TRUE(search.tooLarge());
-  EXPECT_GT(search.tooLarge()->bytes, bytes);
-  EXPECT_GE(*search.tooLarge()->psnr, best + 6.0);
-  EXPECT_TRUE(search.tooLarge()->estimated);
+  EXPECT_FALSE(search.tooLargeFor(best - 1.0));
+  const auto tooLarge = search.tooLargeFor(best + 6.0);
+  ASSERT_TRUE(tooLarge);
+  EXPECT_GT(tooLarge->bytes, bytes);
+  EXPECT_GE(*tooLarge->psnr, best + 6.0);
+  EXPECT_TRUE(tooLarge->estimated);
 }
 
 TEST_F(VoxelSearch, TakesExactVoxelsOfASizeOnlyIfTheyKeepToIt) {
@@ -94,18 +93,12 @@ TEST_F(VoxelSearch, StoresAHandfulOfValuesExactly) {
   EXPECT_EQ(decodeGrid(found.grid).values, volume_.values);
 }
 
-TEST_F(VoxelSearch, EndsWhereExactVoxelsTakeLittleMoreThanTheirMask) {
+TEST_F(VoxelSearch, TakesExactVoxelsThatTakeLittleMoreThanTheirMask) {
   options_.storage.activity = Activity::kExact;
   test::Random random(11);
   volume_ =
       test::volumeOf({}, 3, 0.0f, [&](Coord) { return random(0.0, 1.0) < 0.4 ? 0.7f : 0.0f; });
-  const auto found = forPsnr(30.0);
-  EXPECT_EQ(decodeGrid(found.grid).values, volume_.values);
-  EXPECT_FALSE(found.plateau.tried) << "no lattice takes fewer bytes than the mask";
-  // Two values that the mask does not tell apart take more than it, so that lattices are tried.
-  volume_ =
-      test::volumeOf({}, 3, 0.0f, [&](Coord) { return random(0.0, 1.0) < 0.4 ? 0.7f : 0.9f; });
-  EXPECT_TRUE(forPsnr(30.0).plateau.tried);
+  EXPECT_EQ(decodeGrid(forPsnr(30.0).grid).values, volume_.values);
 }
 
 TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
@@ -118,15 +111,6 @@ TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
     if (volume_.values[i] != 0.731f) continue;
     ASSERT_NEAR(back.values[i], 0.731f, 1e-5f);
   }
-  EXPECT_TRUE(found.plateau.tried && found.plateau.used);
-  EXPECT_EQ(found.plateau.bytesWith, found.bytes);
-  EXPECT_FALSE(found.plateau.bytesWithout) << "another lattice was tried, though this one is fine";
-}
-
-TEST_F(VoxelSearch, RecordsThatThereIsNoPlateau) {
-  const auto found = forPsnr(40.0);
-  EXPECT_FALSE(found.plateau.tried || found.plateau.used);
-  EXPECT_FALSE(found.plateau.bytesWith);
 }
 
 TEST_F(VoxelSearch, StoresOneValueInFewBytes) {
@@ -142,17 +126,17 @@ TEST_F(VoxelSearch, SlowKnowsFromASampleWhatALargeVolumeTakes) {
   volume_ = test::volumeOf({}, 10, 0.0f, [&](Coord v) {
     return float(std::sin(0.11 * v.x) * std::cos(0.07 * v.y) + 0.02 * random(0.0, 1.0));
   });
-  encode::VoxelSearch psnr(job_, {.psnr = 45.0, .sampleBricks = 192});
+  encode::VoxelSearch psnr(job_, {.psnr = 45.0}, 192);
   const Candidate expected = *psnr.estimate();
   EXPECT_TRUE(expected.estimated);
   const auto found = psnr.run();
   EXPECT_GE(found->psnr, 45.0);
   EXPECT_LT(found->psnr, 45.5);
   EXPECT_EQ(found->psnr, psnrOverBox(volume_, decodeGrid(found->grid)));
-  const double margin = encode::kTuning.estimateMargin;
+  const double margin = encode::kEstimateMargin;
   EXPECT_LT(double(expected.bytes), margin * double(found->bytes));
   EXPECT_GT(double(expected.bytes) * margin, double(found->bytes));
-  encode::VoxelSearch size(job_, {.bytes = found->bytes, .sampleBricks = 192});
+  encode::VoxelSearch size(job_, {.bytes = found->bytes}, 192);
   EXPECT_NEAR(*size.estimate()->psnr, found->psnr, 3.0);
   EXPECT_LE(size.run()->bytes, found->bytes);
 }

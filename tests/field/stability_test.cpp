@@ -10,7 +10,7 @@
 // not change by more than its bound; this holds at the edge, at the end of the support, and for the
 // paper's kernel, which jumps there. The bound of m is compared with float32 arithmetic.
 
-#include "esvr/field.h"
+#include "support/stability.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -21,12 +21,9 @@
 
 #include "field/line_form.h"
 #include "field/random_field.h"
-#include "field/reference_brick.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
-
-using test::RandomFieldOptions;
 
 struct StabilityShape {
   const char* name;
@@ -38,7 +35,7 @@ std::ostream& operator<<(std::ostream& out, const StabilityShape& shape) {
 }
 
 Field fieldOfShape(const StabilityShape& shape) {
-  Field field = test::randomField(shape.field);
+  Field field = randomField(shape.field);
   field.kernel.form = shape.form;
   return field;
 }
@@ -119,7 +116,7 @@ TEST(Stability, ComparesWhatIsLeftOfClampedValues) {
 
 /// Spheres with a support of less than three voxels, all with the same center.
 Field spheresAtOneVoxel(std::initializer_list<float> intensities) {
-  Field field = test::randomField({.count = intensities.size(), .extent = 1.0});
+  Field field = randomField({.count = intensities.size(), .extent = 1.0});
   Ellipsoids& e = field.chunks[0].ellipsoids;
   for (auto& center : e.center) std::ranges::fill(center, 3.0f);
   for (auto& scale : e.logScale) std::ranges::fill(scale, 0.0f);
@@ -187,7 +184,7 @@ TEST(CorrectDigits, AreThoseBelowThePeak) {
 // The ellipsoids that are most difficult to evaluate.
 
 TEST(ExtremeEllipsoids, AreThoseOfTheEllipsoids) {
-  Field field = test::randomField({.count = 3, .kappa = 4.0f});
+  Field field = randomField({.count = 3, .kappa = 4.0f});
   Ellipsoids& e = field.chunks[0].ellipsoids;
   e.logScale = {std::vector{0.0f, std::log(0.1f), 1.0f},
                 {0.0f, std::log(100.0f), 1.0f},
@@ -208,10 +205,9 @@ TEST(ExtremeEllipsoids, AreThoseOfTheEllipsoids) {
 }
 
 TEST(ExtremeEllipsoids, HaveCentersInIndexSpace) {
-  Field field = test::randomField({.count = 3, .extent = 1.0, .origin = {100, 0, -8}});
+  Field field = randomField({.count = 3, .extent = 1.0, .origin = {100, 0, -8}});
   field.chunks.push_back(
-      test::randomField({.count = 1, .extent = 1.0, .intensity = 0.0, .origin = {5000, 8, 8}})
-          .chunks[0]);
+      randomField({.count = 1, .extent = 1.0, .intensity = 0.0, .origin = {5000, 8, 8}}).chunks[0]);
   for (Chunk& chunk : field.chunks)
     for (auto& center : chunk.ellipsoids.center) std::ranges::fill(center, 2.6f);
   Ellipsoids& first = field.chunks[0].ellipsoids;
@@ -228,10 +224,9 @@ TEST(ExtremeEllipsoids, HaveCentersInIndexSpace) {
 
 // Both sums are in float64 and have the same terms, in the same order.
 TEST(ReferenceBrick, IsTheDefinition) {
-  Field field = test::randomField({.count = 40, .aspect = 30.0});
+  Field field = randomField({.count = 40, .aspect = 30.0});
   field.background = 0.25f;
-  field.chunks.push_back(
-      test::randomField({.count = 10, .origin = {-5, 3, 9}, .seed = 3}).chunks[0]);
+  field.chunks.push_back(randomField({.count = 10, .origin = {-5, 3, 9}, .seed = 3}).chunks[0]);
   const ReferenceField reference(field);
   for (const Coord corner : {Coord{0, 0, 0}, Coord{16, 24, 8}, Coord{-8, 0, 32}}) {
     const ReferenceBrick brick = reference.evaluate(corner);
@@ -242,7 +237,7 @@ TEST(ReferenceBrick, IsTheDefinition) {
 }
 
 TEST(ReferenceBrick, ListsWhatReachesIt) {
-  Field field = test::randomField({.count = 1, .extent = 1.0, .smallest = 1.0, .aspect = 1.0});
+  Field field = randomField({.count = 1, .extent = 1.0, .smallest = 1.0, .aspect = 1.0});
   field.chunks[0].ellipsoids.intensity[0] = -2.0f;
   const ReferenceField reference(field);
   const ReferenceBrick near = reference.evaluate({0, 0, 0}), far = reference.evaluate({80, 0, 0});
@@ -257,7 +252,7 @@ TEST(ReferenceBrick, ListsWhatReachesIt) {
 
 // A GPU rounds to units of the largest intensity too.
 TEST(ReferenceBrick, HasALargerBoundForIntegerSums) {
-  const Field field = test::randomField({.count = 40});
+  const Field field = randomField({.count = 40});
   const ReferenceField reference(field);
   const ReferenceBrick brick = reference.evaluate({16, 16, 16});
   EXPECT_GT(reference.bound(brick, 0, {.integerSums = true}), reference.bound(brick, 0, {}));
@@ -290,7 +285,7 @@ TEST_P(RoundingBound, HasTheSlopeOfTheKernel) {
 }
 
 TEST_P(RoundingBound, HasTheSteepestSlopeOfAnInterval) {
-  test::Random random(3);
+  Random random(3);
   for (int n = 0; n < 100; ++n) {
     const double from = random(0.0, kernel_.cutoff), to = random(from, kernel_.cutoff);
     const double steepest = rounding::steepest(kernel_, from, to);
@@ -300,7 +295,7 @@ TEST_P(RoundingBound, HasTheSteepestSlopeOfAnInterval) {
 }
 
 TEST_P(RoundingBound, CoversEveryErrorOfM) {
-  test::Random random(5);
+  Random random(5);
   for (const double error : {1e-6, 1e-3, 0.1, 2.0})
     for (int n = 0; n < 200; ++n) {
       const double m = random(0.0, 1.1 * kernel_.cutoff + error);
@@ -331,8 +326,7 @@ float squaredInFloat(const LineForm& f, Coord voxel) {
 }
 
 TEST(RoundingBoundOfM, CoversFloat32) {
-  const Field field =
-      test::randomField({.count = 200, .extent = 8.0, .smallest = 0.1, .aspect = 1000.0});
+  const Field field = randomField({.count = 200, .extent = 8.0, .smallest = 0.1, .aspect = 1000.0});
   const Ellipsoids& e = field.chunks[0].ellipsoids;
   double largestShare = 0.0;
   for (std::size_t i = 0; i < e.size(); ++i) {
@@ -354,4 +348,4 @@ TEST(RoundingBoundOfM, CoversFloat32) {
 }
 
 }  // namespace
-}  // namespace esvr
+}  // namespace esvr::test

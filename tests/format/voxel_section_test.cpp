@@ -112,15 +112,6 @@ TEST(VoxelSection, FindsMirrors) {
   EXPECT_EQ(voxelsOf(putVoxels(exactLayer(mirrored)), "v"), exactLayer(mirrored));
 }
 
-/// Only the codes are counted, and not the at most 115 bytes before them or the palette.
-TEST(VoxelSection, KnowsWhetherItTakesMore) {
-  for (const VoxelLayer& layer : someLayers()) {
-    const std::size_t bytes = putVoxels(layer).size();
-    EXPECT_FALSE(format::takeMore(layer, bytes));
-    EXPECT_TRUE(format::takeMore(layer, bytes - 120 - layer.palette.size() * sizeof(float)));
-  }
-}
-
 /// Noise of two bricks that are repeated along y and z and mirrored along x is stored once.
 TEST(VoxelSection, CopiesBricks) {
   Random random(12);

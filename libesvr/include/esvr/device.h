@@ -76,7 +76,7 @@ void requireWithinMemory(double neededBytes, std::uint64_t maxBytes, const std::
 // themselves.
 //
 // A call that has a part of its result when it is cancelled may return the best result so far instead
-// (fit.h, convert.h). It completes this result in a BestSoFar, where no loop is cancelled.
+// (fit.h, encode.h). It completes this result in a BestSoFar, where no loop is cancelled.
 
 /// A flag that another thread or a signal handler sets to stop a long call at its next safe point.
 /// It belongs to the caller.

@@ -1,7 +1,6 @@
 #pragma once
-/// The encoder: converts a volume to a stored grid for a goal, quantises fitted ellipsoids, leaves the
-/// less important ones out, corrects signs, and chooses what the grids of a file share. vdb2esvr and
-/// esvr-compare call it for every grid.
+/// The encoder: converts a volume to a stored grid for a goal, and leaves the less important ellipsoids of a grid out.
+/// vdb2esvr and esvr-compare call it for every grid.
 ///
 /// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
 /// (three for Preset::kHigh and above the usual effort; four of at most half the length where ellipsoids take
@@ -32,9 +31,9 @@ struct FitGoal {
   friend auto operator<=>(const FitGoal&, const FitGoal&) = default;
 };
 
-/// The smallest grid found with the quality that FitOptions::preset stands for: presetPicturePsnr() if the
-/// measure is what is seen, presetSurfaceBound() for a level set that is no narrow band (isNarrowBand,
-/// grid_coding.h), and otherwise an error of at most that of presetPsnr() over the active voxels.
+/// The smallest grid found with the quality that FitOptions::preset stands for (PresetQuality): picturePsnr if the
+/// measure is what is seen, surfaceBound for a level set that is no narrow band (isNarrowBand, grid_coding.h), and
+/// otherwise an error of at most that of psnr over the active voxels.
 /// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
 /// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {
@@ -92,13 +91,15 @@ struct LosslessGoal {
 using Goal = std::variant<FitGoal, PresetGoal, SizeGoal, PsnrGoal, PictureGoal, BoundGoal,
                           RelativeBoundGoal, LosslessGoal>;
 
-/// PSNR over the active voxels that a preset stands for, dB, and that of the transmittance.
-[[nodiscard]] double presetPsnr(Preset preset);
-[[nodiscard]] double presetPicturePsnr(Preset preset);
-
-/// The largest error of a value of a level set that a preset stands for, relative to the change of the values by
-/// one voxel across the surface: about the largest distance by which the surface moves, in voxels.
-[[nodiscard]] double presetSurfaceBound(Preset preset);
+/// The quality that a preset stands for.
+struct PresetQuality {
+  double psnr = 0.0;         ///< PSNR over the active voxels, dB
+  double picturePsnr = 0.0;  ///< PSNR of the transmittance, dB
+  /// The largest error of a value of a level set, relative to the change of the values by one voxel across the surface:
+  /// about the largest distance by which the surface moves, in voxels.
+  double surfaceBound = 0.0;
+};
+[[nodiscard]] PresetQuality qualityOf(Preset preset);
 
 /// What the quality of a PresetGoal and of a SizeGoal means.
 enum class Measure {
@@ -106,7 +107,7 @@ enum class Measure {
   /// of its transmittance for T = 0.5, unless the PSNR over the active voxels limits it: it may be 4 dB
   /// lower with a tone curve, and must be 2 dB higher without one. A level set that is no narrow band, or
   /// for a preset one of more than 16 voxels, is judged by its surface, since its values far from it, such as
-  /// markers of empty space, may be of any size: it is stored as voxels, with presetSurfaceBound() for a preset. For any other volume, as kValues.
+  /// markers of empty space, may be of any size: it is stored as voxels, with PresetQuality::surfaceBound for a preset. For any other volume, as kValues.
   kAuto,
   kValues  ///< the PSNR of values
 };
@@ -170,10 +171,9 @@ struct ConvertOptions {
   const StoredGrid* previous = nullptr;
   /// How the ellipsoids of `previous` were rounded. Those of the frame are rounded alike, or a little more or less.
   std::optional<CompactRecord> previousCompact{};
-  /// Active voxels whose errors do not count, because the conversion has chosen their values. It is set by
-  /// convertVolume() where the source has values that are not finite.
-  std::uint64_t filledVoxels = 0;
-  const VoxelLayer* filled = nullptr;  ///< their places; set with them, and null if there are none
+  /// The places of active voxels whose errors do not count, because the conversion has chosen their values; null: there are
+  /// none. It is set by convertVolume() where the source has values that are not finite.
+  const VoxelLayer* filled = nullptr;
   /// Voxels keep a part of the errors of the previous frame, if there is one. Errors that stay in
   /// their places flicker less, for a few bytes more. It is false where `previous` is another grid.
   bool keepsPastErrors = true;
@@ -248,7 +248,7 @@ struct Conversion {
 /// \throws CannotConvert  active voxels are 2^24 voxels or more apart
 /// \throws RuntimeFailure  the stored grid exceeds its bound; a voxel of a narrow band has another
 ///                         sign than in the source (the text names the grid and the voxel)
-/// Other exceptions are those of fit and compactGrid.
+/// \throws RuntimeFailure  no quantisation lattice can hold the ellipsoids. Other exceptions are those of fit.
 [[nodiscard]] Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options);
 
 struct PaperConversion {
@@ -260,67 +260,10 @@ struct PaperConversion {
 /// \throws UsageError  the volume is a narrow band; k is learned for each ellipsoid, but the
 ///                     storage is kCompact
 /// \throws BadInput  values are too large for sums, as for convertVolume
-/// Other exceptions are those of fitByPaper and compactGrid.
+/// Other exceptions are those of fitByPaper.
 [[nodiscard]] PaperConversion convertByPaper(const ConvertInput& input,
                                              const PaperFitOptions& options,
                                              const StorageOptions& storage);
-
-// Chooses the grids of a file whose voxels are the context of other grids' voxels (VoxelReference),
-// so that they take fewer bytes.
-
-/// Chooses a reference for a grid of voxels. Candidates are compared on a sample of its bricks.
-/// \param grids  the grids of a file. Those of `candidates` must be before `grid`, and those among
-///               them that hold no voxels are ignored.
-/// \return the reference with which the voxels take the fewest bytes of those that were tried, the
-///         empty one among them. They may take even fewer without a reference (bytesAdded).
-[[nodiscard]] VoxelReference chooseReference(std::span<const StoredGrid> grids, std::size_t grid,
-                                             std::span<const std::size_t> candidates);
-
-/// The grid that a reference names, with the values that are expected for the grid that refers to
-/// it. As ConvertOptions::previous it makes a conversion choose voxels that take few bytes with this
-/// reference.
-/// \param grid  refers to the other grid
-[[nodiscard]] StoredGrid expectedFrom(std::span<const StoredGrid> grids, std::size_t grid,
-                                      const VoxelReference& reference);
-
-// Compacts a fitted grid. Rate control chooses the quantisation steps; the ellipsoids are
-// quantised, and their intensities are solved for again.
-
-struct CompactOptions {
-  /// PSNR over the box, in dB, that quantising may lose against the same ellipsoids in float32. With
-  /// 0.1 dB, a file is hardly worse than its fit; 0.3 dB would save 2 to 11 % of the bytes.
-  double loss = 0.1;
-  /// PSNR over the box, in dB, that the smallest result must reach. It replaces `loss`.
-  std::optional<double> psnr{};
-  /// Bytes that the ellipsoids of the best result may take. It replaces `loss` and `psnr`.
-  std::optional<std::uint64_t> bytes{};
-  std::optional<Box> box{};      ///< box of the PSNR; default: the active bounding box
-  std::optional<double> peak{};  ///< peak of the PSNR, above 0; default: peakOf() of the source
-  Device device{};               ///< device that evaluates the trials
-  bool layerErrors = true;       ///< whether the errors of the layers are measured
-  /// The result is made in about the time of three evaluations of the grid: the steps are those with
-  /// which a search would begin, or, for `bytes`, the first that fit; the intensities are rounded but
-  /// not solved for, and there are no errors of layers. It serves for
-  /// forecasts, and to complete a conversion that was cancelled.
-  bool quick = false;
-};
-
-struct CompactResult {
-  StoredGrid grid;  ///< the quantised grid; its field is the one that a reader gets
-  QuantiserSteps steps;
-  double loss = 0.0;        ///< dB; negative if solving for the intensities gained more
-  std::uint64_t bytes = 0;  ///< bytes of the ellipsoids
-};
-
-/// Compacts a grid. The result is deterministic on one device. Devices round differently, so that
-/// they may choose different steps. If the wanted PSNR or size is out of reach, the result is the
-/// nearest one found.
-/// \param grid  a grid that makeStoredGrid made from `source`; Ellipsoids::kappa must be empty
-/// \throws RuntimeFailure  no quantisation lattice can hold the ellipsoids, or each ellipsoid has
-///                         its own kappa
-/// \throws DeviceError  the GPU cannot be used
-[[nodiscard]] CompactResult compactGrid(const StoredGrid& grid, const SparseVolume& source,
-                                        const CompactOptions& options = {});
 
 // Coarser levels of detail of a grid: the most important of its ellipsoids.
 
@@ -333,14 +276,5 @@ struct CompactResult {
 /// depends on kappa only. The result has no quantised form, no layers and no residual. A grid that
 /// has no more ellipsoids is returned unchanged.
 [[nodiscard]] StoredGrid heaviest(StoredGrid grid, std::size_t count);
-
-// A residual corrects the sum of ellipsoids voxel by voxel where its sign is wrong.
-
-/// Corrects the sign of every voxel of a narrow band where the sum has another one than the source,
-/// by a residual. A reader on any machine then finds the signs of the source: evaluations on different
-/// machines differ by rounding (field.h), and the residual includes a margin for that.
-/// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
-/// \return the grid without a residual if no sign is wrong
-[[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
 
 }  // namespace esvr

@@ -48,7 +48,7 @@ class PartRunner {
 };
 
 /// A preset determines the number of ellipsoids and the length of the schedule if they are not
-/// given, and the quality of a PresetGoal (convert.h).
+/// given, and the quality of a PresetGoal (encode.h).
 enum class Preset { kDraft, kStandard, kHigh };
 
 /// Usual gain of PSNR by twice the ellipsoids, dB. It serves estimates only.
@@ -143,7 +143,7 @@ struct FitResult {
 /// of threads, and in every run on GPUs of one kind, unless `seconds` ends the run. CPU and GPU use
 /// the same method and formulas but round differently, so that their fits differ slightly.
 /// \return a result whose end is kPsnrMissed if options.psnr was given and not reached;
-///         convertVolume (convert.h) searches for the smallest grid that reaches a PSNR
+///         convertVolume (encode.h) searches for the smallest grid that reaches a PSNR
 /// \throws BadInput    the volume has no active voxel
 /// \throws UsageError  count is 0 or less than options.start has, or options contradict each other
 /// \throws Cancelled   the fit was cancelled before it had a result

@@ -144,13 +144,6 @@ class GridNames {
   std::unordered_map<std::string, std::size_t> byUnique_;
 };
 
-/// GridNames::allUnique() of these names.
-[[nodiscard]] std::vector<std::string> uniqueNames(std::span<const std::string> names);
-
-/// GridNames::findWhole() in these names.
-[[nodiscard]] std::size_t findGrid(std::span<const std::string> names, const std::string& wanted,
-                                   const std::filesystem::path& file = {});
-
 /// What tells grids of one name apart.
 struct GridTraits {
   std::string name;         ///< stored name

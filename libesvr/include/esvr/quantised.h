@@ -113,7 +113,7 @@ void quantiseIntensities(std::span<const float> intensities, QuantisedEllipsoids
 [[nodiscard]] Ellipsoids dequantise(const QuantisedEllipsoids& q);
 
 // A grid's voxels as integer codes, exact or within a bound. A file holds such a layer if voxels
-// were chosen instead of ellipsoids (convert.h), or as a residual.
+// were chosen instead of ellipsoids (encode.h), or as a residual.
 
 /// The meaning of an integer code n.
 enum class VoxelForm {
@@ -247,8 +247,5 @@ struct ThriftyLayer {
 
 /// Largest absolute difference of two volumes' voxels over the bricks of both, active or not.
 [[nodiscard]] double largestDifference(const SparseVolume& a, const SparseVolume& b);
-
-/// Largest absolute difference of a layer's voxels from the volume's.
-[[nodiscard]] double largestError(const SparseVolume& volume, const VoxelLayer& layer);
 
 }  // namespace esvr

@@ -218,6 +218,14 @@ struct SparseVolume {
 
 /// Index in `bricks` of the brick at a position relative to the volume's origin, if it exists.
 [[nodiscard]] std::optional<std::size_t> findBrick(const SparseVolume& volume, Coord brick);
+/// Index of the brick that has a voxel, index coordinates, which may be 2^32 voxels from the others.
+[[nodiscard]] std::optional<std::size_t> brickWith(const SparseVolume& volume, Coord voxel);
+/// The first voxels of the bricks, index coordinates.
+[[nodiscard]] std::vector<Coord> brickCorners(const SparseVolume& volume);
+/// A volume of bricks with these first voxels, increasing, that has the values of another one, and none that is active.
+/// What the other one has not has its background.
+[[nodiscard]] SparseVolume withBricks(const SparseVolume& volume,
+                                      const std::vector<Coord>& corners);
 
 /// Value at an index coordinate, which is the background outside the bricks.
 [[nodiscard]] float valueAt(const SparseVolume& volume, Coord voxel);

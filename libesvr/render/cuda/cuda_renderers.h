@@ -40,8 +40,12 @@ namespace esvr::cuda {
                                                               const Device& device,
                                                               const RendererLimits& limits);
 
-/// Decodes given bricks of a field. The arguments and exceptions are those of evaluateBricksOn
-/// (esvr/render.h).
+/// Evaluates V at all voxels of bricks with the decoder of the renderers, for comparisons with the definition.
+/// \param corners  index corners of the bricks, multiples of 8, increasing
+/// \param out      kBrickVoxels values for each brick, in voxelOffset order
+/// \throws DeviceError  as for makeCudaSumRenderer
+/// \throws MemoryExceeded  as for reachedBricks (field.h)
+/// \throws UsageError  the bounding box of the bricks has more than 2^28 blocks of 64^3 voxels
 void decodeBricks(const Device& device, const Field& field, std::span<const Coord> corners,
                   std::span<float> out);
 

@@ -29,6 +29,7 @@
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid.h"
 #include "fit/run.h"
+#include "support/stability.h"
 
 #ifdef ESVR_WITH_CUDA
 #include "core/cuda/runtime.h"
@@ -244,20 +245,20 @@ struct Options {
 Json finiteOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 Json evaluation(const Field& field, const Device& device) {
-  StabilityOptions options;
+  test::StabilityOptions options;
   options.samples = 512;
   options.evaluate = [&](const Field& f, std::span<const Coord> corners, std::span<float> out) {
-    evaluateBricksOn(device, f, corners, out);
+    test::evaluateBricksOn(device, f, corners, out);
   };
-  options.arithmetic = arithmeticOf(device);
-  const Stability s = measureStability(field, options);
+  options.arithmetic = test::arithmeticOf(device);
+  const test::Stability s = test::measureStability(field, options);
   const Coord at = s.worst.front().at;
   return {{"max", finiteOrNull(s.largest)},
           {"rms", finiteOrNull(s.rms)},
           {"bound", s.bound},
           {"share_of_bound", finiteOrNull(s.shareOfBound)},
           {"peak", s.peak},
-          {"digits", correctDigits(s.largest, s.peak)},
+          {"digits", test::correctDigits(s.largest, s.peak)},
           {"at", {at.x, at.y, at.z}},
           {"overlap", s.largestOverlap},
           {"cancellation", s.meanCancellation},

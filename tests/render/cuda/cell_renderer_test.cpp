@@ -30,6 +30,7 @@
 #include "render/reference_picture.h"
 #include "render/scenes.h"
 #include "support/machine.h"
+#include "support/stability.h"
 
 namespace esvr::test {
 namespace {

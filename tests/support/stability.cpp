@@ -1,7 +1,4 @@
-/// How precisely fields are evaluated: the definition in float64, the bound of the rounding in float32, the
-/// ellipsoids that are most difficult to evaluate, and the comparison of both on bricks of a field.
-
-#include "esvr/field.h"
+#include "support/stability.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,9 +7,9 @@
 
 #include "core/parallel.h"
 #include "field/evaluate.h"
-#include "field/reference_brick.h"
+#include "render/cuda/cuda_renderers.h"
 
-namespace esvr {
+namespace esvr::test {
 namespace {
 
 /// |L d|^2
@@ -24,27 +21,6 @@ double squaredLength(const Matrix3& L, const double (&d)[3]) {
   }
   return m;
 }
-
-}  // namespace
-
-double evaluateReference(const Field& field, Coord voxel) {
-  double value = field.background;
-  for (const Chunk& chunk : field.chunks) {
-    const Ellipsoids& e = chunk.ellipsoids;
-    for (std::size_t i = 0; i < e.size(); ++i) {
-      const double d[3] = {double(voxel.x) - chunk.origin.x - e.center[0][i],
-                           double(voxel.y) - chunk.origin.y - e.center[1][i],
-                           double(voxel.z) - chunk.origin.z - e.center[2][i]};
-      const auto k = kernelConstants<double>(field.kernel, kappaOf(field, e, i));
-      value += double(e.intensity[i]) * kernelPhi(k, squaredLength(unitFrame(e, i), d));
-    }
-  }
-  return value;
-}
-
-// The sums of bricks and their bounds.
-
-namespace {
 
 /// A number of voxels along an axis, rounded away from the middle of an interval and limited to the
 /// index space.
@@ -200,6 +176,18 @@ std::vector<Coord> centersOfExtremes(const Field& field) {
 }
 
 // The comparison.
+
+void evaluateBricksOn(const Device& device, const Field& field, std::span<const Coord> corners,
+                      std::span<float> out) {
+  if (device.kind == DeviceKind::kCuda)
+    cuda::decodeBricks(device, field, corners, out);
+  else
+    evaluateBricks(field, corners, out);
+}
+
+Arithmetic arithmeticOf(const Device& device) {
+  return {.integerSums = device.kind == DeviceKind::kCuda};
+}
 
 namespace {
 
@@ -358,4 +346,4 @@ int correctDigits(double difference, double peak) {
   return std::min(kMost, int(std::floor(-std::log10(share))));
 }
 
-}  // namespace esvr
+}  // namespace esvr::test
