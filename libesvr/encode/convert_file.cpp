@@ -15,6 +15,7 @@
 #include <variant>
 
 #include "core/add_seconds.h"
+#include "core/counted.h"
 #include "encode/grids_of_file.h"
 #include "encode/job.h"
 #include "esvr/container.h"
@@ -94,19 +95,45 @@ void GridConverter::findScale(std::size_t g) {
 
 SourceKey GridConverter::keyOf(std::size_t g, const VolumeGrid& source) const {
   return {esvr::keyOf({source.descriptor, source.volume}), scales_[g].peak, scales_[g].range,
-          grids_[g].goal};
+          grids_[g].goal, source.narrowing.largest()};
 }
+
+namespace {
+
+/// Subtracts from a bound what is lost because doubles become floats. Their range, to which a bound in % refers, may be
+/// lost, too.
+void allowForNarrowing(const VolumeGrid& source, Goal& goal) {
+  const Narrowing& narrowing = source.narrowing;
+  if (narrowing.errors.count() == 0) return;
+  const auto less = [&](double bound, double lost, const char* unit = "") {
+    if (lost < bound) return bound - lost;
+    throw CannotConvert("grid '" + shownName(source.descriptor.name) +
+                        "': floats differ from its doubles by up to " + shortText(lost) + unit +
+                        ", and the bound is " + shortText(bound));
+  };
+  if (auto* within = std::get_if<BoundGoal>(&goal)) {
+    const double range = narrowing.max - narrowing.min;
+    if (!within->relative || range > 0.0)
+      *within = {
+          less(within->relative ? within->bound * range : within->bound, narrowing.largest())};
+  } else if (auto* share = std::get_if<RelativeBoundGoal>(&goal)) {
+    share->share = less(share->share, narrowing.relativeAbove(share->floor), " times their values");
+  }
+}
+
+}  // namespace
 
 const Goal& GridConverter::goalOf(std::size_t g) const {
   return grids_[g].goal ? *grids_[g].goal : options_.convert.goal;
 }
 
 /// The goal of a grid. A bound in % of the range of vectors is the same for all components.
-Goal GridConverter::resolvedGoal(std::size_t g) const {
+Goal GridConverter::resolvedGoal(std::size_t g, const VolumeGrid& source) const {
   Goal goal = goalOf(g);
   const auto& range = scales_[g].range;
   if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && range)
     *within = {within->bound * *range, false};
+  allowForNarrowing(source, goal);
   return goal;
 }
 
@@ -197,7 +224,7 @@ GridConversion GridConverter::readAndConvert(std::size_t g, const Wish& wish,
 
 void GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
                             ConvertOptions options, GridConversion& made) const {
-  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
+  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g, source);
   if (scales_[g].peak) options.fit.peak = scales_[g].peak;
   if (grids_[g].component) options.measure = Measure::kValues;
   // With a size, every grid uses its own bytes for its values.

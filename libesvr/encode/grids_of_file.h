@@ -70,7 +70,7 @@ class GridConverter {
 
   void step(const GridStep& step) const;
   void findScale(std::size_t g);
-  [[nodiscard]] Goal resolvedGoal(std::size_t g) const;
+  [[nodiscard]] Goal resolvedGoal(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] GridConversion readAndConvert(std::size_t g, const Wish& wish,
                                               const FitOptions& fit) const;
   void convert(std::size_t g, const VolumeGrid& source, const Wish& wish, ConvertOptions options,

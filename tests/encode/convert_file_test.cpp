@@ -21,6 +21,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "support/files.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -147,6 +148,33 @@ TEST(ConvertGrids, LetsVoxelsReferToThoseOfAnotherGrid) {
       bytesWithoutSharing(together, inspectEsvr(encodeEsvr(together.file), "file"));
   EXPECT_GE(figure, bytesApart);
   EXPECT_LT(figure, bytesApart + 8);
+}
+
+/// A bound is one of the doubles, and so is the range of one in percent.
+TEST(ConvertGrids, LeavesRoomInABoundForWhatFloatsLoseOfDoubles) {
+  const SparseVolume ball = softBall({}, 1.0f);
+  VolumeGrid grid;
+  grid.descriptor.name = "d";
+  grid.descriptor.valueType = ValueType::kDouble;
+  grid.volume = ball;
+  grid.narrowing.add(0.004, 0.0f, {});
+  grid.narrowing.add(1.0, 1.0f, {});
+  const auto convert = [&](const Goal& goal) {
+    FileSource file = fileOf({{"d", ball}});
+    file.grids.front().read = [grid] { return grid; };
+    return convertGrids(file, fileOptions(goal)).file.grids.front();
+  };
+  for (const auto& [goal, bound] : {std::pair<Goal, double>{BoundGoal{0.01}, 0.01 - 0.004},
+                                    {BoundGoal{0.01, true}, 0.01 - 0.004},
+                                    {RelativeBoundGoal{0.02, 0.5}, 0.02 - 0.008}}) {
+    const double most = compareVolumes(ball, decodeGrid(convert(goal))).maxError;
+    EXPECT_LE(most, bound + 1e-9);
+    EXPECT_GT(most, 0.5 * bound);
+  }
+  for (const Goal& goal :
+       {Goal{BoundGoal{0.004}}, Goal{BoundGoal{0.004, true}}, Goal{RelativeBoundGoal{0.5}}})
+    EXPECT_THAT([&] { (void)convert(goal); },
+                test::ThrowsSaying<CannotConvert>("floats differ from its doubles"));
 }
 
 TEST(ConvertGrids, KeepsTheGoalsOfSingleGridsWhileTheyShare) {
