@@ -495,6 +495,11 @@ class GridsConversion {
     while (!convertAll(shares)) {
       earlier_ = std::exchange(made_, std::vector<std::optional<GridConversion>>(made_.size()));
       shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
+      if (!isCompact() || !shares.isOverdrawn()) continue;
+      // What a grid needs is known of its own bytes, of which a compact file saves an unknown number. A size that this
+      // number decides may still do for grids that are each counted alone.
+      isEachAlone_ = true;
+      shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
     }
     isOverdrawn_ = shares.isOverdrawn();
     for (const auto& [g, twin] : twins_)
@@ -558,11 +563,6 @@ class GridsConversion {
         convert(g, shares);
       } catch (const SizeTooSmall& error) {
         if (source_.grids.size() == 1) throw;
-        // What a grid needs is known of its own bytes, and the size may have to be overdrawn by those.
-        if (isCompact()) {
-          isEachAlone_ = true;
-          return false;
-        }
         // With other bytes another fit may need a few more. These steps end such a search soon.
         needed_[g] = share + std::max(error.missing, share / 8 + 8);
         return false;

@@ -266,6 +266,21 @@ TEST(ConvertGridsToSize, OfManyGridsIsNearlyUsedUp) {
   EXPECT_GE(double(bytes), 0.9 * double(kSize));
 }
 
+/// Also if a grid among them needs more bytes than its share.
+TEST(ConvertGridsToSize, OfManyGridsIsNearlyUsedUpBesideOneThatNeedsMore) {
+  constexpr std::uint64_t kSize = 10'000;
+  const SparseVolume cloud = test::smoothVolume();
+  std::vector<std::pair<std::string, SparseVolume>> grids{{longName(), softBall({}, 1.0f, 3.0)}};
+  for (int g = 0; g < 12; ++g) {
+    grids.push_back({"grid " + std::to_string(g), cloud});
+    for (float& value : grids.back().second.values) value *= float(g + 1);
+  }
+  const std::uint64_t bytes =
+      encodeEsvr(convertGrids(fileOf(grids), sizedOptions(kSize)).file).size();
+  EXPECT_LE(bytes, kSize);
+  EXPECT_GE(double(bytes), 0.9 * double(kSize));
+}
+
 TEST(ConvertGridsToSize, IsRefusedIfNothingFits) {
   const SparseVolume ball = softBall({}, 1.0f, 3.0), other = softBall({}, 2.0f, 4.0);
   EXPECT_THROW((void)convertGrids(fileOf({{"a", ball}, {longName(), other}}), sizedOptions(900)),
