@@ -427,10 +427,11 @@ class Comparison {
                        {.box = options_.box,
                         .peak = options_.peak,
                         .ssim = ssim_,
-                        .transmittance = isLookedThrough(a.descriptor.gridClass, a.volume)});
+                        .transmittance = isLookedThrough(a.descriptor.gridClass, a.volume),
+                        .narrowing = between(a.narrowing, b.narrowing)});
     grid.figures = figuresOf(grid.metrics);
     addMeshDistance(grid, a, b);
-    addRelativeError(grid, a.volume, b.volume);
+    addRelativeError(grid, a.volume, b.volume, between(a.narrowing, b.narrowing));
     grid.differences = compareDescriptors(a.descriptor, b.descriptor);
     addDifferences(compareInactive(a.inactive, b.inactive), grid);
     grid.range = valueRangeOf(a.volume);
@@ -444,8 +445,10 @@ class Comparison {
     const VectorGrid b = both.candidate.readVectors(both.ofCandidate);
     const SparseVolume lengths = magnitudeOf(a.components), others = magnitudeOf(b.components);
     requireOverlap(both, lengths, others, record);
-    const VectorMetrics metrics = compareVectors(
-        a.components, b.components, {.box = options_.box, .peak = options_.peak, .ssim = ssim_});
+    const auto narrowing = between(a.narrowing, b.narrowing);
+    const VectorMetrics metrics =
+        compareVectors(a.components, b.components,
+                       {.box = options_.box, .peak = options_.peak, .ssim = ssim_}, narrowing);
     const double range = valueRangeOfVectors(a.components), peak = metrics.magnitude.peak;
     record.grids.push_back({.name = both.a().uniqueName,
                             .candidateName = both.b().uniqueName,
@@ -465,7 +468,7 @@ class Comparison {
                               .differences = backgroundDifferences(a, b, c),
                               .range = range,
                               .vectors = LimitedRows::kComponents});
-      addRelativeError(record.grids.back(), a.components[c], b.components[c]);
+      addRelativeError(record.grids.back(), a.components[c], b.components[c], narrowing[c]);
       addTemporal(record.grids.back(), {a.components[c], b.components[c], peak});
     }
   }
@@ -499,10 +502,12 @@ class Comparison {
     grid.figures[figure] = meshDistance(c, d).voxels;
   }
 
-  void addRelativeError(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b) const {
+  void addRelativeError(CheckedGrid& grid, const SparseVolume& a, const SparseVolume& b,
+                        const Narrowing& narrowing) const {
     const auto figure = std::size_t(FigureId::kRelativeError);
     if (options_.limits[figure])
-      grid.figures[figure] = largestRelativeError(a, b, options_.relativeFloor).share;
+      grid.figures[figure] = largestRelativeError(a, b, options_.relativeFloor).share +
+                             narrowing.relativeAbove(options_.relativeFloor);
   }
 
   void addTemporal(CheckedGrid& grid, const ComparedVolumes& volumes) const {

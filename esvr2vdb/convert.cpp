@@ -110,24 +110,27 @@ VolumeMetrics compare(const ComparedFiles& files, const ComparedGrid& grid) {
     return readGrid(path, place, files.reading(path));
   };
   const VolumeGrid reference = read(*options.reference, grid.reference);
-  const SparseVolume written =
-      files.isEmpty(grid) ? SparseVolume{} : read(options.output, grid.written).volume;
+  const VolumeGrid written =
+      files.isEmpty(grid) ? VolumeGrid{} : read(options.output, grid.written);
   return compareVolumes(
-      reference.volume, written,
+      reference.volume, written.volume,
       {.box = options.box,
        .ssim = true,
-       .transmittance = isLookedThrough(reference.descriptor.gridClass, reference.volume)});
+       .transmittance = isLookedThrough(reference.descriptor.gridClass, reference.volume),
+       .narrowing = between(reference.narrowing, written.narrowing)});
 }
 
 VectorMetrics compareVectorGrid(const ComparedFiles& files, const ComparedGrid& grid) {
   const Options& options = files.options;
   const auto read = [&](const auto& path, std::size_t place) {
-    return readVector(path, place, files.reading(path)).components;
+    return readVector(path, place, files.reading(path));
   };
-  const VectorVolume reference = read(*options.reference, grid.reference);
-  const VectorVolume written =
-      files.isEmpty(grid) ? VectorVolume{} : read(options.output, grid.written);
-  return compareVectors(reference, written, {.box = options.box, .ssim = true});
+  const VectorGrid reference = read(*options.reference, grid.reference);
+  const VectorGrid written =
+      files.isEmpty(grid) ? VectorGrid{} : read(options.output, grid.written);
+  return compareVectors(reference.components, written.components,
+                        {.box = options.box, .ssim = true},
+                        between(reference.narrowing, written.narrowing));
 }
 
 std::vector<std::string> row(const std::string& name, const VolumeMetrics& m) {
@@ -288,16 +291,14 @@ const GridDescriptor& descriptorOf(const DecodedGrid& grid) {
   return std::visit([](const auto& g) -> const GridDescriptor& { return g.descriptor; }, grid);
 }
 
-void tellEmpty(const DecodedGrid& grid, const cli::Log& log) {
-  if (activeVoxelsOf(grid) == 0)
-    log.warning("grid \"" + shownName(descriptorOf(grid).name) +
-                "\" comes back without an active voxel");
-}
-
-DecodedGrid decoded(const EsvrFile& file, const GridOfFile& grid, const Options& options,
-                    const DecodeOptions& decode) {
-  if (grid.isVector) return decoded(file, file.vectors[grid.index], options, decode);
-  return decoded(file.grids[grid.index], options, decode);
+DecodedGrid decoded(const EsvrFile& file, const ListedGrid& named, const Options& options,
+                    const DecodeOptions& decode) try {
+  const std::size_t index = named.grid.index;
+  if (named.grid.isVector) return decoded(file, file.vectors[index], options, decode);
+  return decoded(file.grids[index], options, decode);
+} catch (Error& error) {
+  error.nameGrid(shownName(storedParts(file, named.grid).front().descriptor.name), named.name);
+  throw;
 }
 
 /// The grids that are not carried, and the components of those of vectors.
@@ -326,8 +327,9 @@ std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<Liste
   DecodeOptions decode = decodingOf(file, options);
   for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
-    grids.push_back(decoded(file, named.grid, options, decode));
-    tellEmpty(grids.back(), log);
+    grids.push_back(decoded(file, named, options, decode));
+    if (activeVoxelsOf(grids.back()) == 0)
+      log.warning("grid \"" + named.name + "\" comes back without an active voxel");
     // All grids are in memory, and twice while they are written.
     decode.maxBytes -= std::min(decode.maxBytes, 2 * bytesOf(grids.back()));
   }
@@ -367,20 +369,27 @@ void tellLostMetadata(const EsvrFile& file, const std::vector<DecodedGrid>& grid
               std::to_string(items) + (items == 1 ? " item" : " items"));
 }
 
-/// Warns of carried grids with which older versions of OpenVDB open no grid of the file.
-void tellHalfGrids(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
-                   const Options& options, const cli::Log& log) {
-  if (writesNano(options)) return;
-  for (const auto& [grid, name, place] : chosen)
-    if (grid.isCarried && file.carried[grid.index].treeType.starts_with("Tree_half_"))
-      log.warning("grid \"" + shownName(name) +
+/// Warns of carried grids with which older versions of OpenVDB open no grid of the file, and of those whose doubles a
+/// NanoVDB file does not get.
+void tellCarried(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
+                 const Options& options, const cli::Log& log) {
+  const bool isNano = writesNano(options);
+  for (const auto& [grid, name, place] : chosen) {
+    if (!grid.isCarried) continue;
+    const std::string& type = file.carried[grid.index].treeType;
+    if (!isNano && type.starts_with("Tree_half_"))
+      log.warning("grid \"" + name +
                   "\" is a HalfGrid; only OpenVDB 13 and newer open a file with one");
+    if (isNano && (type.starts_with("Tree_double_") || type.starts_with("Tree_vec3d_")))
+      log.warning("grid \"" + name +
+                  "\": its doubles are rounded to floats; a .vdb file keeps them");
+  }
 }
 
 void tellNotCompared(const std::vector<ListedGrid>& chosen, const cli::Log& log) {
   for (const auto& [grid, name, place] : chosen)
     if (grid.isCarried)
-      log.warning("grid \"" + shownName(name) +
+      log.warning("grid \"" + name +
                   "\" was carried unchanged, and is not compared with the reference");
 }
 
@@ -401,7 +410,7 @@ void tellUncut(const EsvrFile& file, const std::vector<ListedGrid>& chosen, cons
   for (const auto& [grid, name, place] : chosen) {
     if (grid.isCarried) continue;
     const StoredGrid& part = storedParts(file, grid).front();
-    const std::string start = "grid \"" + shownName(name) + "\" comes back whole: ";
+    const std::string start = "grid \"" + name + "\" comes back whole: ";
     if (part.voxels && isCut(options))
       log.warning(start + "it has voxels, and --lod and --max-ellipsoids select ellipsoids");
     else if (options.part.layers && layerCount(part) == 1)
@@ -486,7 +495,7 @@ void convertContent(const Options& given, const EsvrFile& file, const CancelToke
   const auto grids = decodeAll(file, chosen, options, log);
   if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
-  tellHalfGrids(file, chosen, options, log);
+  tellCarried(file, chosen, options, log);
   tellUncut(file, chosen, options, log);
   tellImprecise(file, chosen, log);
   writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);

@@ -33,6 +33,11 @@ struct FittedGrid {
   std::size_t place = 0;                   ///< its index in VdbSummary::grids
   std::optional<std::size_t> component{};  ///< of vectors
   std::string uniqueName;  ///< of the grid or the component, by GridNames of the input
+
+  /// The name in its descriptor.
+  [[nodiscard]] std::string storedName() const {
+    return component ? componentName(source.name, *component) : source.name;
+  }
 };
 
 struct GridChoice {

@@ -105,11 +105,17 @@ VolumeGrid measureValues(const Options& options, const VolumeGrid& source, Conve
   const CommonFitOptions& fit = options.convert.fit;
   VolumeGrid decoded{.descriptor = source.descriptor,
                      .volume = decodeGrid(grid.stored(), {.memory = memoryOf(source.volume)})};
+  const Narrowing& narrowing = source.narrowing;
+  if (narrowing.max > narrowing.min)
+    grid.narrowingOfRange = narrowing.largest() / (narrowing.max - narrowing.min);
   grid.isBoxEmpty = fit.box && isEmpty(source.volume, *fit.box);
   const bool isLight =
       !grid.id.component && isLookedThrough(source.descriptor.gridClass, source.volume);
   grid.metrics = compareVolumes(source.volume, decoded.volume,
-                                {.box = fit.box, .peak = grid.key.peak, .transmittance = isLight});
+                                {.box = fit.box,
+                                 .peak = grid.key.peak,
+                                 .transmittance = isLight,
+                                 .narrowing = source.narrowing});
   return decoded;
 }
 
@@ -157,7 +163,8 @@ VectorMetrics measureVector(const Options& options, const EsvrFile& file,
   const VectorGrid source = readVector(options.input, place, options.read);
   const VectorGrid decoded =
       decodeVector(vector.name, componentsOf(file, vector), {.memory = options.read.memory});
-  return compareVectors(source.components, decoded.components, {.box = options.convert.fit.box});
+  return compareVectors(source.components, decoded.components, {.box = options.convert.fit.box},
+                        source.narrowing);
 }
 
 }  // namespace esvr::vdb2esvr

@@ -35,7 +35,12 @@ void carryInactiveValues(const Options& options, const std::function<void(std::s
 /// Runs what reads or converts a grid. A refusal gets the way out at the end of its text.
 template <class Body>
 auto sayingTheWayOut(const FittedGrid& grid, const Body& body) try {
-  return body();
+  try {
+    return body();
+  } catch (Error& error) {
+    error.nameGrid(shownName(grid.storedName()), grid.uniqueName);
+    throw;
+  }
 } catch (const NotFinite& error) {
   throw BadInput(
       error.what() +
@@ -62,11 +67,13 @@ struct SurfaceErrors {
 };
 
 struct ConvertedGrid : GridConversion {
-  std::string uniqueName;                ///< FittedGrid::uniqueName
-  std::string sourceName;                ///< GridSummary::uniqueName of the grid of the input
-  NamedGrid id;                          ///< its place in the input
-  VolumeMetrics metrics;                 ///< errors of the decoded grid
-  bool isBoxEmpty = false;               ///< no active voxel is in the box of --box
+  std::string uniqueName;  ///< FittedGrid::uniqueName
+  std::string sourceName;  ///< GridSummary::uniqueName of the grid of the input
+  NamedGrid id;            ///< its place in the input
+  VolumeMetrics metrics;   ///< errors of the decoded grid
+  double narrowingOfRange =
+      0.0;                  ///< largest error of its doubles as floats, as a share of their range
+  bool isBoxEmpty = false;  ///< no active voxel is in the box of --box
   std::optional<double> wantedPsnr;      ///< PSNR over the box that the grid should reach, dB
   std::optional<SurfaceErrors> surface;  ///< of a narrow band
   std::string whyNoNarrowBand;           ///< of a level set that is none (whyNoNarrowBand())

@@ -70,6 +70,14 @@ Json toneJson(const std::optional<ToneCurve>& tone) {
   return tone->isOn() ? Json(tone->scale) : Json("off");
 }
 
+/// What becomes of voxels that are NaN or infinite.
+Json nonFiniteJson(const ReadOptions& read) {
+  if (read.nonFinite == NonFinite::kValue) return read.nonFiniteValue;
+  return cli::wordOf(read.nonFinite, {{"refuse", NonFinite::kRefuse},
+                                      {"keep", NonFinite::kKeep},
+                                      {"background", NonFinite::kBackground}});
+}
+
 }  // namespace
 
 Json askedJson(const Options& options) {
@@ -100,6 +108,7 @@ Json askedJson(const Options& options) {
           {"topology", cli::wordOf(storage.activity, kActivities)},
           {"keep", options.grids.keep},
           {"skip", options.grids.skip},
+          {"nonfinite", nonFiniteJson(options.read)},
           {"seed", fit.seed},
           {"threads", options.threads > 0 ? Json(options.threads) : Json(nullptr)},
           {"device", options.device},

@@ -55,15 +55,21 @@ void addInput(const fs::path& input, std::vector<PartOrigin>& origin) {
   origin.push_back({"input's time of change", std::to_string(changed)});
 }
 
-std::vector<PartOrigin> originOf(const Options& options, const Device& device) {
+/// What decides the result of a conversion beside its input.
+std::vector<PartOrigin> originOf(const Options& options) {
   std::vector<PartOrigin> origin{{"version", cli::programVersion()}};
-  addInput(options.input, origin);
   const auto asked = askedJson(options);
   for (const auto& [name, value] : asked.items())
     if (name != "threads" && name != "device") origin.push_back({name, value.dump()});
   std::string grids;
   for (const auto& grid : options.grids.only) grids += '"' + grid + '"';
   origin.push_back({"grids", grids});
+  return origin;
+}
+
+std::vector<PartOrigin> originOf(const Options& options, const Device& device) {
+  std::vector<PartOrigin> origin = originOf(options);
+  addInput(options.input, origin);
   origin.push_back({"kind of device", device.kind == DeviceKind::kCpu ? "CPU" : "GPU"});
   return origin;
 }
@@ -389,6 +395,12 @@ GridChoice chooseFor(Options& options, const VdbSummary& input) {
   if (input.grids.empty() && options.sequence) return {};
   resolveNames(input, options);
   return chooseGrids(options.input, input, options.grids);
+}
+
+std::uint64_t hashOfOrigin(const Options& options) {
+  std::string all;
+  for (const auto& [name, value] : originOf(options)) all += name + '=' + value + '\n';
+  return std::hash<std::string>()(all);
 }
 
 StoreFile writingTo(const Options& options) {

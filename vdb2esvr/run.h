@@ -22,6 +22,9 @@ namespace esvr::vdb2esvr {
 /// \throws BadInput, UsageError  as for resolveNames and chooseGrids
 [[nodiscard]] GridChoice chooseFor(Options& options, const VdbSummary& input);
 
+/// A hash of what decides the result of a conversion beside its input.
+[[nodiscard]] std::uint64_t hashOfOrigin(const Options& options);
+
 /// Stores the converted file and returns a summary of its sections.
 using StoreFile = std::function<EsvrSummary(const EsvrFile&)>;
 

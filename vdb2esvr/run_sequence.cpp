@@ -539,7 +539,7 @@ class FileOfGroups {
         cancel_(cancel),
         groups_(planGroups(frames)),
         conversion_(options, frames, cancel),
-        writer_(options.output, {options.overwrite, partialOf(options)}) {
+        writer_(options.output, {options.overwrite, partialOf(options), hashOfOrigin(options)}) {
     keepGroups(frames);
   }
 

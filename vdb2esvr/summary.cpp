@@ -84,6 +84,15 @@ void printInactive(const RunRecord& record, const ConvertedGrid& grid, std::ostr
   out << '\n';
 }
 
+/// Says that a grid loses doubles whose range is small beside their magnitude.
+void printNarrowing(const ConvertedGrid& grid, std::ostream& out) {
+  constexpr double kMuch = 0.001;
+  if (grid.narrowingOfRange < kMuch) return;
+  out << cli::printable(grid.uniqueName) << ": its doubles become floats, which differ by up to "
+      << cli::shortNumber(100.0 * grid.narrowingOfRange) << " % of their range; --keep "
+      << cli::printable(cli::shellWord(grid.sourceName)) << " keeps them\n";
+}
+
 /// Says that the goal was measured by what is seen, and which tone curve serves it, or by the surface.
 void printMeasure(const ConvertedGrid& grid, std::ostream& out) {
   if (const auto bound = grid.conversion.surfaceBound)
@@ -101,6 +110,7 @@ void printMeasure(const ConvertedGrid& grid, std::ostream& out) {
 
 /// Says how the data of a grid were made.
 void printNote(const ConvertedGrid& grid, std::ostream& out) {
+  printNarrowing(grid, out);
   printMeasure(grid, out);
   printSurface(grid, out);
   if (!grid.twinOf) {

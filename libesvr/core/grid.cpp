@@ -2,9 +2,9 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <map>
 
+#include "core/counted.h"
 #include "esvr/did_you_mean.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
@@ -371,13 +371,6 @@ std::uint64_t hashOf(double value) {
   return mixed(std::bit_cast<std::uint64_t>(value == 0.0 ? 0.0 : value));
 }
 
-std::string shortText(double value) {
-  char
-      text[32];  // a stream would bring the locales of the C++ library into the decoder of the page
-  std::snprintf(text, sizeof text, "%g", value);
-  return text;
-}
-
 }  // namespace
 
 void InactiveValues::add(double value, const Box& tile) {
@@ -412,6 +405,27 @@ InactiveValues InactiveValues::ofComponent(std::size_t component) const {
   InactiveValues values = *this;
   values.digest_ *= mixed(component);
   return values;
+}
+
+void Narrowing::addError(double value, double error, Coord at) {
+  errors.add(error, at);
+  squares += error * error;
+  relative = std::max(relative, std::abs(error / value));
+}
+
+Narrowing between(const Narrowing& a, const Narrowing& b) {
+  if (a.errors == b.errors) return {};
+  Narrowing sum = a;
+  sum.errors.add(a.largest() + b.largest(), b.errors.first());
+  // The root of the sum is at most the sum of the roots.
+  const double root = std::sqrt(a.squares) + std::sqrt(b.squares);
+  sum.squares = root * root;
+  sum.relative += b.relative;
+  return sum;
+}
+
+VectorNarrowing between(const VectorNarrowing& a, const VectorNarrowing& b) {
+  return {between(a[0], b[0]), between(a[1], b[1]), between(a[2], b[2])};
 }
 
 std::string toText(const InactiveValues& values) {

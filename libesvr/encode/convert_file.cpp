@@ -16,6 +16,7 @@
 #include <variant>
 
 #include "core/add_seconds.h"
+#include "core/counted.h"
 #include "encode/grids_of_file.h"
 #include "encode/job.h"
 #include "esvr/container.h"
@@ -144,19 +145,45 @@ void GridConverter::findScale(std::size_t g) {
 
 SourceKey GridConverter::keyOf(std::size_t g, const VolumeGrid& source) const {
   return {esvr::keyOf({source.descriptor, source.volume}), scales_[g].peak, scales_[g].range,
-          grids_[g].goal};
+          grids_[g].goal, source.narrowing.largest()};
 }
+
+namespace {
+
+/// Subtracts from a bound what is lost because doubles become floats. Their range, to which a bound in % refers, may be
+/// lost, too.
+void allowForNarrowing(const VolumeGrid& source, Goal& goal) {
+  const Narrowing& narrowing = source.narrowing;
+  if (narrowing.errors.count() == 0) return;
+  const auto less = [&](double bound, double lost, const char* unit = "") {
+    if (lost < bound) return bound - lost;
+    throw CannotConvert("grid '" + shownName(source.descriptor.name) +
+                        "': floats differ from its doubles by up to " + shortText(lost) + unit +
+                        ", and the bound is " + shortText(bound));
+  };
+  if (auto* within = std::get_if<BoundGoal>(&goal)) {
+    const double range = narrowing.max - narrowing.min;
+    if (!within->relative || range > 0.0)
+      *within = {
+          less(within->relative ? within->bound * range : within->bound, narrowing.largest())};
+  } else if (auto* share = std::get_if<RelativeBoundGoal>(&goal)) {
+    share->share = less(share->share, narrowing.relativeAbove(share->floor), " times their values");
+  }
+}
+
+}  // namespace
 
 const Goal& GridConverter::goalOf(std::size_t g) const {
   return grids_[g].goal ? *grids_[g].goal : options_.convert.goal;
 }
 
 /// The goal of a grid. A bound in % of the range of vectors is the same for all components.
-Goal GridConverter::resolvedGoal(std::size_t g) const {
+Goal GridConverter::resolvedGoal(std::size_t g, const VolumeGrid& source) const {
   Goal goal = goalOf(g);
   const auto& range = scales_[g].range;
   if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && range)
     *within = {within->bound * *range, false};
+  allowForNarrowing(source, goal);
   return goal;
 }
 
@@ -234,7 +261,7 @@ GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source, c
   }
   ConvertOptions options = options_.convert;
   options.fit = fit;
-  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g);
+  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g, source);
   options.previous = wish.expected ? wish.expected : previous;
   if (before) options.previousCompact = before->compact;
   if (wish.expected) options.keepsPastErrors = false;  // those of another grid are not worth it
@@ -499,6 +526,11 @@ class GridsConversion {
     while (!convertAll(shares)) {
       earlier_ = std::exchange(made_, std::vector<std::optional<GridConversion>>(made_.size()));
       shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
+      if (!isCompact() || !shares.isOverdrawn()) continue;
+      // What a grid needs is known of its own bytes, of which a compact file saves an unknown number. A size that this
+      // number decides may still do for grids that are each counted alone.
+      isEachAlone_ = true;
+      shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
     }
     isOverdrawn_ = shares.isOverdrawn();
     for (const auto& [g, twin] : twins_)
@@ -562,11 +594,6 @@ class GridsConversion {
         convert(g, shares);
       } catch (const SizeTooSmall& error) {
         if (source_.grids.size() == 1) throw;
-        // What a grid needs is known of its own bytes, and the size may have to be overdrawn by those.
-        if (isCompact()) {
-          isEachAlone_ = true;
-          return false;
-        }
         // With other bytes another fit may need a few more. These steps end such a search soon.
         needed_[g] = share + std::max(error.missing, share / 8 + 8);
         return false;

@@ -13,6 +13,7 @@
 #include <variant>
 
 #include "core/add_seconds.h"
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "encode/ellipsoids.h"
 #include "encode/non_finite.h"
@@ -66,10 +67,11 @@ class Choice {
   /// \param smallEnough  bytes of voxels below which no ellipsoids are tried
   Conversion forPsnr(double share, std::uint64_t smallEnough) {
     if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
-    if (isConstant(job_.input.source))
+    if (isConstant(job_.input.source) || isBeyondFloats())
       return asConversion(exactVoxels(job_), {}, FitEnd::kPsnrReached);
     voxels_.emplace(job_, goal_);
-    if (wanted_ == Representation::kVoxels || !plan_.fitsInTime) return completeVoxels();
+    if (wanted_ == Representation::kVoxels || !plan_.fitsInTime || *goal_.psnr > kMostOfSums)
+      return completeVoxels();
     ellipsoids_.emplace(job_, goal_);
     const auto expected = estimateAndDraft(share, smallEnough);
     if (isCancelled(job_)) return bestSoFar();
@@ -127,9 +129,17 @@ class Choice {
   /// dB by which the PSNR of voxels of a size may be higher than on a sample, whose runs have fewer
   /// neighbours and whose models learn less.
   static constexpr double kSampleDb = 3.0;
+  /// PSNR, dB, that sums of ellipsoids in float32 do not reach.
+  static constexpr double kMostOfSums = 110.0;
   /// Smallest number of active voxels from which on a GPU makes the short fits while the CPU tries
   /// voxels. Those of smaller volumes are soon tried, and often show that no fit is needed.
   static constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
+
+  /// True if only exact voxels have the PSNR: steps of the floats next to the peak have less.
+  [[nodiscard]] bool isBeyondFloats() const {
+    constexpr double kMostOfFloats = 156.0;
+    return *goal_.psnr > kMostOfFloats && !seesPictures(job_);
+  }
 
   /// Bytes that fits of so many iterations must save to be worth their time, which on a GPU is short.
   std::uint64_t leastSaving(double iterations) const {
@@ -517,14 +527,17 @@ std::optional<Coord> tooLargeForSums(const SparseVolume& volume) {
                  "size, a bound or lossless");
 }
 
+bool mustBeEllipsoids(const ConvertOptions& options) {
+  return options.representation == Representation::kEllipsoids ||
+         options.storage.form == Storage::kFloat32 || std::holds_alternative<FitGoal>(options.goal);
+}
+
 /// The representation of a grid: voxels, if its values are too large for sums.
 Representation possibleRepresentation(const ConvertInput& input, const ConvertOptions& options) {
   const auto tooLarge = tooLargeForSums(input.source);
   if (!tooLarge || std::holds_alternative<LosslessGoal>(options.goal))
     return options.representation;
-  if (options.representation == Representation::kEllipsoids ||
-      options.storage.form == Storage::kFloat32 || std::holds_alternative<FitGoal>(options.goal))
-    refuseSums(input, *tooLarge);
+  if (mustBeEllipsoids(options)) refuseSums(input, *tooLarge);
   return Representation::kVoxels;
 }
 
@@ -594,6 +607,23 @@ std::optional<float> nearBackground(const ConvertInput& input, const ConvertOpti
     if (range.min <= before && before <= range.max) return before;
   }
   return meanOf(source, range);
+}
+
+/// The input of ellipsoids whose inactive voxels have other values than the background, which is how the inside of a level
+/// set with holes is told from its outside. No sum has these values where there is no band around them.
+/// \throws BadInput  a PSNR is wanted that even the exact active voxels do not have without them
+SparseVolume withoutInactive(const ConvertInput& input, const ConvertOptions& options) {
+  SparseVolume flat = input.source;
+  setBackground(flat.background, flat);
+  const auto* wanted = std::get_if<PsnrGoal>(&options.goal);
+  if (!wanted || options.storage.form != Storage::kCompact) return flat;
+  const double most =
+      psnrOverBox(input.source, flat, {.box = options.fit.box, .peak = options.fit.peak});
+  if (most < wanted->psnr)
+    throw BadInput("grid '" + shownName(input.descriptor.name) + "': ellipsoids reach at most " +
+                   shortText(most) +
+                   " dB, because they have no signs of inactive voxels; voxels reach any PSNR");
+  return flat;
 }
 
 /// Converts a volume whose background is far from its values relative to a background among them.
@@ -731,6 +761,11 @@ Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
     if (auto made = convertSurface(input, own)) return std::move(*made);
   if (keepsVoxels(own)) own.representation = Representation::kVoxels;
   own.representation = possibleRepresentation(input, own);
+  if (!own.fit.narrowBand && !isUniformOutside(input.source)) {
+    if (mustBeEllipsoids(own))
+      return converted({input.descriptor, withoutInactive(input, own)}, options);
+    if (own.representation == Representation::kAuto) own.representation = Representation::kVoxels;
+  }
   if (std::holds_alternative<PictureGoal>(own.goal) && !Judge::seesPictures(input, own))
     own.goal = PresetGoal{};
   if (const StoredGrid* before = ellipsoidsBefore(input, own)) {

@@ -63,7 +63,7 @@ class GridConverter {
   };
 
   void findScale(std::size_t g);
-  [[nodiscard]] Goal resolvedGoal(std::size_t g) const;
+  [[nodiscard]] Goal resolvedGoal(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] bool needsExactSet(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] const GridBefore* recordOf(const StoredGrid* previous) const;
   [[nodiscard]] bool isAsBefore(const StoredGrid* previous, const VolumeGrid& source,

@@ -34,13 +34,15 @@ void noteSkipped(const SectionTable& table, std::vector<std::string>& notes) {
 }
 
 /// Readers of voxels need no map, but no VDB file can be made with one that is damaged.
-void requireMap(const StoredGrid& grid, const std::string& file) {
-  if (const auto fault = mapFaultOf(grid.descriptor.transform))
-    throw BadInput(file + ": grid '" + grid.descriptor.name + "': " + fault->text);
+void requireMaps(const EsvrFile& content, const std::string& file) {
+  const auto names = namesOfStored(content);
+  for (std::size_t g = 0; g < content.grids.size(); ++g)
+    if (const auto fault = mapFaultOf(content.grids[g].descriptor.transform))
+      throw BadInput(file + ": grid '" + names[g] + "': " + fault->text);
 }
 
-void noteGrid(const StoredGrid& grid, std::vector<std::string>& notes) {
-  const std::string name = "grid '" + shownName(grid.descriptor.name) + "'";
+void noteGrid(const StoredGrid& grid, const std::string& unique, std::vector<std::string>& notes) {
+  const std::string name = "grid '" + unique + "'";
   if (grid.field.ellipsoidCount() == 0)
     notes.push_back(name +
                     (grid.voxels ? " holds voxels and no ellipsoids" : " has no ellipsoids"));
@@ -72,10 +74,9 @@ std::vector<std::string> checkEsvr(const std::filesystem::path& path, const Read
   std::vector<std::string> notes;
   noteVersion(table, notes);
   noteSkipped(table, notes);
-  for (const auto& grid : file.grids) {
-    requireMap(grid, path.string());
-    noteGrid(grid, notes);
-  }
+  requireMaps(file, path.string());
+  const auto names = namesOfStored(file);
+  for (std::size_t g = 0; g < file.grids.size(); ++g) noteGrid(file.grids[g], names[g], notes);
   for (const auto& grid : file.carried) noteCarried(grid, notes);
   return notes;
 }
@@ -132,10 +133,7 @@ std::vector<SequenceFault> checkSequence(const std::filesystem::path& path,
   std::vector<SequenceFault> faults;
   SequenceReader reader(path, limits);
   for (const SequenceFrame& frame : reader.frames()) try {
-      for (const StoredGrid& grid : reader.read(frame.number).grids)
-        if (const auto fault = mapFaultOf(grid.descriptor.transform))
-          throw BadInput(frameName(path.string(), frame.number) + ": grid '" +
-                         grid.descriptor.name + "': " + fault->text);
+      requireMaps(reader.read(frame.number), frameName(path.string(), frame.number));
     } catch (const BadInput& fault) {
       faults.push_back({frame.number, fault.what()});
     }

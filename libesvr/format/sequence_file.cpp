@@ -183,7 +183,11 @@ std::uint64_t endOf(const std::vector<FrameGroup>& groups) {
   return groups.empty() ? kFirstGroupAt : endOf(groups.back());
 }
 
-std::vector<std::byte> partialHeader() { return encodeTable(emptyTable()); }
+std::vector<std::byte> partialHeader(std::uint64_t origin) {
+  SectionTable table = emptyTable();
+  table.tableOffset = origin;
+  return encodeTable(table);
+}
 
 SequenceEnd encodeEnd(const std::vector<FrameGroup>& groups) {
   const std::uint64_t offset = endOf(groups);
@@ -215,11 +219,28 @@ std::vector<FrameGroup> readGroups(const ByteSource& source) {
   return groups;
 }
 
-std::vector<FrameGroup> findGroups(const ByteSource& source) {
-  const auto expected = partialHeader();
+namespace {
+
+/// True for the partial header of any origin.
+bool isPartialHeader(const std::vector<std::byte>& header) {
+  constexpr std::size_t kOriginAt =
+      kMagic.size() + 2 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + sizeof(std::uint64_t);
+  if (header.size() < kHeaderBytes) return false;
+  const auto rest = std::span(header).subspan(kOriginAt);
+  ByteReader in(rest, "header");
+  return header == partialHeader(in.get<std::uint64_t>());
+}
+
+}  // namespace
+
+std::vector<FrameGroup> findGroups(const ByteSource& source, std::uint64_t origin) {
   const auto header = source.read(0, std::min<std::uint64_t>(source.size(), kHeaderBytes));
-  // A process may have been killed between writing the final header and renaming the file.
-  if (header != expected) return readGroups(source);
+  if (header != partialHeader(origin)) {
+    if (isPartialHeader(header))
+      throw UsageError(source.name() + " was begun with other options or by another version");
+    // A process may have been killed between writing the final header and renaming the file.
+    return readGroups(source);
+  }
   std::vector<FrameGroup> groups;
   try {
     for (;;) groups.push_back(completeGroup(source, endOf(groups)));
@@ -395,10 +416,12 @@ void requireOurs(const PartialFile& file, PartialSequence partial) {
 class SequenceWriter::File {
  public:
   File(const std::filesystem::path& path, const SequenceWriteOptions& options)
-      : name_(path.string()), file_(path, options.overwrite, startOf(options.partial)) {
+      : name_(path.string()),
+        origin_(options.origin),
+        file_(path, options.overwrite, startOf(options.partial)) {
     requireOurs(file_, options.partial);
     if (options.partial == PartialSequence::kResume && file_.size() > kHeaderBytes)
-      groups_ = findGroups(FileSource(file_.path()));
+      groups_ = findGroups(FileSource(file_.path()), origin_);
     dropGroups(groups_.size());
   }
   ~File() {
@@ -413,7 +436,7 @@ class SequenceWriter::File {
     groups_.resize(std::min(n, groups_.size()));
     frames_ = framesOf(groups_);
     // The header comes first: a complete one must not stand before a shorter file.
-    file_.replaceStart(partialHeader());
+    file_.replaceStart(partialHeader(origin_));
     file_.truncate(endOf(groups_));
     file_.flush();
   }
@@ -485,6 +508,7 @@ class SequenceWriter::File {
   }
 
   std::string name_;
+  std::uint64_t origin_;
   PartialFile file_;
   std::vector<FrameGroup> groups_;
   std::vector<SequenceFrame> frames_;

@@ -69,8 +69,9 @@ inline constexpr std::uint64_t kFirstGroupAt = kHeaderBytes;
 /// The offset at which the next group begins.
 [[nodiscard]] std::uint64_t endOf(const std::vector<FrameGroup>& groups);
 
-/// The header of a file that is not complete. It says that the file has no sections and no bytes.
-[[nodiscard]] std::vector<std::byte> partialHeader();
+/// The header of a file that is not complete. It says that the file has no sections and no bytes, and
+/// has SequenceWriteOptions::origin in the place of the offset of the table.
+[[nodiscard]] std::vector<std::byte> partialHeader(std::uint64_t origin);
 
 /// The complete end of a file, and the header that makes it valid.
 struct SequenceEnd {
@@ -85,6 +86,7 @@ struct SequenceEnd {
 
 /// Finds the complete groups of a partial file, whose frames have correct checksums.
 /// \throws BadInput  the header is not partialHeader(), and not that of a complete file either
-[[nodiscard]] std::vector<FrameGroup> findGroups(const ByteSource& source);
+/// \throws UsageError  it is that of another origin
+[[nodiscard]] std::vector<FrameGroup> findGroups(const ByteSource& source, std::uint64_t origin);
 
 }  // namespace esvr::format

@@ -287,6 +287,22 @@ VolumeMetrics figuresOf(const Comparison& c) {
   return m;
 }
 
+/// Adds what the volumes have lost of doubles. The root of a sum of squares is at most the sum of the roots.
+void addNarrowing(const Narrowing& narrowing, VolumeMetrics& m) {
+  if (narrowing.errors.count() == 0) return;
+  const auto add = [&](double voxels, double& mse, double& decibels) {
+    if (!(voxels > 0.0)) return;
+    const double root = std::sqrt(mse) + std::sqrt(narrowing.squares / voxels);
+    mse = root * root;
+    decibels = psnr(mse, m.peak);
+  };
+  add(m.boxVoxels, m.mseBox, m.psnrBox);
+  add(double(m.activeVoxels), m.mseActive, m.psnrActive);
+  if (m.maxError == 0.0) m.maxErrorAt = narrowing.errors.first();
+  m.maxError += narrowing.largest();
+  m.p999Error += narrowing.largest();
+}
+
 /// Adds the figures that need the volumes, all of whose values are finite.
 void addFigures(const SparseVolume& reference, const SparseVolume& candidate,
                 const CompareOptions& options, const Comparison& c, VolumeMetrics& m) {
@@ -307,6 +323,7 @@ VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& 
   VolumeMetrics m = figuresOf(c);
   if (m.nonFinite == 0) {
     addFigures(reference, candidate, options, c, m);
+    addNarrowing(options.narrowing, m);
     return m;
   }
   SparseVolume a = reference, b = candidate;
@@ -314,6 +331,7 @@ VolumeMetrics compareVolumes(const SparseVolume& reference, const SparseVolume& 
   dropNonFinite(b);
   c.pairs = metrics::pairBricks(a, b);
   addFigures(a, b, options, c, m);
+  addNarrowing(options.narrowing, m);
   return m;
 }
 
@@ -381,15 +399,34 @@ double valueRangeOfVectors(const VectorVolume& reference) {
   return largest;
 }
 
+namespace {
+
+/// What the lengths of vectors lose is at most what the vectors lose.
+Narrowing ofLengths(const VectorNarrowing& components) {
+  Narrowing lengths;
+  double largestSquared = 0.0;
+  for (const Narrowing& component : components) {
+    largestSquared += component.largest() * component.largest();
+    lengths.squares += component.squares;
+  }
+  if (largestSquared > 0.0) lengths.errors.add(std::sqrt(largestSquared), Coord{});
+  return lengths;
+}
+
+}  // namespace
+
 VectorMetrics compareVectors(const VectorVolume& reference, const VectorVolume& candidate,
-                             const CompareOptions& options) {
+                             const CompareOptions& options, const VectorNarrowing& narrowing) {
   const VectorVolume a = aligned(reference), b = aligned(candidate);
   const SparseVolume lengths = magnitudeOf(a);
   CompareOptions same = options;
   if (!same.peak) same.peak = peakOfLengths(lengths);
+  same.narrowing = ofLengths(narrowing);
   VectorMetrics metrics{compareVolumes(lengths, magnitudeOf(b), same), {}};
-  for (std::size_t c = 0; c < kComponents; ++c)
+  for (std::size_t c = 0; c < kComponents; ++c) {
+    same.narrowing = narrowing[c];
     metrics.components[c] = compareVolumes(a[c], b[c], same);
+  }
   return metrics;
 }
 

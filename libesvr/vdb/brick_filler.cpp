@@ -70,8 +70,7 @@ InactiveValues InactiveCounter::lostIn(const SparseVolume& volume) const {
 float narrowBackground(double background) {
   const auto narrow = float(background);
   if (!std::isfinite(narrow))
-    throw CannotConvert("its background, " + std::to_string(background) +
-                        ", is not a finite float");
+    throw CannotConvert("its background, " + shortText(background) + ", is not a finite float");
   return narrow;
 }
 
@@ -87,15 +86,18 @@ void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options) {
 }
 
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite) {
-  if (tally.count == 0) return;
-  if (nonFinite == NonFinite::kKeep)
-    throw CannotConvert(counted(tally.count, "voxel") + (tally.count == 1 ? " is" : " are") +
-                        " finite but too large for float; the first is at " +
-                        toString(tally.first));
-  if (nonFinite != NonFinite::kRefuse) return;
-  throw NotFinite(counted(tally.count, "voxel") + (tally.count == 1 ? " is" : " are") +
-                  " NaN, infinite or too large for float; the first is at " +
-                  toString(tally.first));
+  const Narrowing& narrowing = tally.narrowing;
+  const double largest = std::max(std::abs(narrowing.min), std::abs(narrowing.max));
+  if (narrowing.errors.count() > 0 && largest < double(std::numeric_limits<float>::min()))
+    throw CannotConvert("all its values are too small for float; the largest magnitude is " +
+                        shortText(largest));
+  const bool areReplaced = nonFinite == NonFinite::kValue || nonFinite == NonFinite::kBackground;
+  if (tally.count == 0 || areReplaced) return;
+  const std::string voxels = counted(tally.count, "voxel") + (tally.count == 1 ? " is " : " are ");
+  const std::string first = "; the first is at " + toString(tally.first);
+  if (tally.tooLarge == tally.count)
+    throw CannotConvert(voxels + "finite but too large for float" + first);
+  throw NotFinite(voxels + "NaN, infinite or too large for float" + first);
 }
 
 void appendBricks(const TileSource& tile, std::vector<Coord>& corners) {

@@ -21,14 +21,17 @@
 
 namespace esvr::vdb {
 
-/// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range.
+/// Active voxels that float cannot hold: NaN, infinite values, and doubles out of range; and what the others lose.
 struct NonFiniteTally {
   float replacement = 0.0f;  ///< which they become
   bool keeps = false;        ///< NaN and infinite values remain, and are not counted
   std::uint64_t count = 0;
-  Coord first{};  ///< the first one in the order of bricks and of voxels in a brick
+  std::uint64_t tooLarge = 0;  ///< of them, those that are finite
+  Coord first{};               ///< the first one in the order of bricks and of voxels in a brick
+  Narrowing narrowing{};
 
-  void add(Coord voxel) {
+  void add(double value, Coord voxel) {
+    tooLarge += std::isfinite(value);
     if (count++ == 0 || std::pair(brickOf(voxel), voxel) < std::pair(brickOf(first), first))
       first = voxel;
   }
@@ -57,7 +60,7 @@ float narrowBackground(double background);
 void refuseTooLarge(std::uint64_t bricks, const ReadOptions& options);
 
 /// \throws NotFinite  there are such voxels, and they are not to be replaced
-/// \throws CannotConvert  those that are not NaN or infinite are to be kept
+/// \throws CannotConvert  there are finite ones, which are not to be replaced, or all values are too small for float
 void refuseNonFinite(const NonFiniteTally& tally, NonFinite nonFinite);
 
 /// A tile.
@@ -128,10 +131,13 @@ void fillTile(const TileSource& tile, SparseVolume& volume, NonFiniteTally& tall
 /// An active value as float. A value that float cannot hold is counted and replaced.
 inline float narrowValue(double value, Coord voxel, NonFiniteTally& tally) {
   const auto narrow = float(value);
-  if (std::isfinite(narrow)) return narrow;
+  if (std::isfinite(narrow)) {
+    tally.narrowing.add(value, narrow, voxel);
+    return narrow;
+  }
   if (tally.keeps && !std::isfinite(value))
     return std::isnan(value) ? std::numeric_limits<float>::quiet_NaN() : narrow;
-  tally.add(voxel);
+  tally.add(value, voxel);
   return tally.replacement;
 }
 

@@ -72,6 +72,9 @@ openvdb::GridBase::Ptr makeOpenVdbGrid(const VectorGrid& grid, const WriteOption
 /// \param grid  must outlive the result
 openvdb::GridBase::Ptr makeOpenVdbGrid(const PackedGrid& grid, const WriteOptions& options);
 
+/// Runs body(g) for each grid. An error that names the grid gets its unique name.
+void forEachNamed(std::span<const GridToWrite> grids, const std::function<void(std::size_t)>& body);
+
 /// Implements writeGrids for .vdb files. Writes to an existing empty file.
 /// \throws std::ios_base::failure  the disk is full
 void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,

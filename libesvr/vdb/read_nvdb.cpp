@@ -471,6 +471,7 @@ void readNanoAs(const NanoBuffer& buffer, std::size_t component, const ReadOptio
       });
   refuseNonFinite(tallies.nonFinite, rules.nonFinite);
   grid.nonFiniteReplaced = tallies.nonFinite.count;
+  grid.narrowing = tallies.nonFinite.narrowing;
   grid.inactive = tallies.inactive.lostIn(volume);
 }
 

@@ -266,6 +266,7 @@ void readVoxelsAs(Archive& archive, const LocatedTree& located, std::size_t comp
   refuseNonFinite(tallies.nonFinite, rules.nonFinite);
   grid.descriptor.background = background;
   grid.nonFiniteReplaced = tallies.nonFinite.count;
+  grid.narrowing = tallies.nonFinite.narrowing;
   grid.inactive = tallies.inactive.lostIn(grid.volume);
 }
 

@@ -98,6 +98,7 @@ VectorGrid joinedComponents(
     vectors.components[c] = std::move(component.volume);
     vectors.nonFiniteReplaced += component.nonFiniteReplaced;
     vectors.inactive.add(component.inactive.ofComponent(c));
+    vectors.narrowing[c] = component.narrowing;
   }
   return vectors;
 }

@@ -136,8 +136,9 @@ class ReadGrids {
     return &volumes_.emplace_back(std::move(volume));
   }
   Readable of(const CarriedGrid& grid) {
-    if (inspectCarried(grid).isVector) return of(vectors_.emplace_back(readVector(grid)));
-    return &volumes_.emplace_back(readGrid(grid));
+    const ReadOptions read{.nonFinite = NonFinite::kKeep};
+    if (inspectCarried(grid).isVector) return of(vectors_.emplace_back(readVector(grid, read)));
+    return &volumes_.emplace_back(readGrid(grid, read));
   }
 
   std::deque<VolumeGrid> volumes_;
@@ -180,7 +181,7 @@ NanoHandle makeNano(const openvdb::GridBase& grid, const NanoForm& form) {
 void writeNanoVdb(const std::filesystem::path& path, std::span<const GridToWrite> grids,
                   const WriteOptions& options) {
   if (grids.empty()) throw BadInput("a .nvdb file cannot be written without a grid; ask for .vdb");
-  for (const GridToWrite& grid : grids) requireNano(grid, options);
+  forEachNamed(grids, [&](std::size_t g) { requireNano(grids[g], options); });
   WriteOptions whole = options;
   whole.half = HalfMode::kOff;
   std::vector<NanoHandle> handles;

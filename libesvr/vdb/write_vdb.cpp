@@ -401,7 +401,7 @@ void chooseHalf(const GridDescriptor& descriptor, const WriteOptions& options, c
   const bool half = options.half == HalfMode::kOn ||
                     (options.half == HalfMode::kAuto && remainsHalf(descriptor, all, grid));
   if (half && !all(fitsHalf))
-    throw UsageError("grid \"" + descriptor.name +
+    throw UsageError("grid \"" + shownName(descriptor.name) +
                      "\" has values beyond 65504, the largest that half precision holds; do not "
                      "ask for halfs");
   if (half != grid.saveFloatAsHalf()) grid.setSaveFloatAsHalf(half);
@@ -564,14 +564,9 @@ GridBase::Ptr makeOpenVdbGrid(const PackedGrid& source, const WriteOptions& opti
   return grid;
 }
 
-void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
-                  std::span<const GridToWrite> grids, const WriteOptions& options) {
-  initializeOpenVdb();
-  // An item names this library as the writer, unless the source's metadata has one.
-  openvdb::MetaMap metadata;
-  insertItems(fileMetadata, metadata);
-  if (!findItem(fileMetadata, kWriterKey))
-    insertItems(std::array{stringItem(kWriterKey, "esvr " ESVR_VERSION)}, metadata);
+namespace {
+
+std::vector<std::string> namesOf(std::span<const GridToWrite> grids) {
   std::vector<std::string> names;
   for (const auto& grid : grids)
     names.push_back(std::visit(
@@ -582,15 +577,39 @@ void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> f
             return any->descriptor.name;
         },
         grid));
+  return names;
+}
 
+}  // namespace
+
+void forEachNamed(std::span<const GridToWrite> grids,
+                  const std::function<void(std::size_t)>& body) {
+  const std::vector<std::string> names = namesOf(grids);
+  const GridNames unique(names);
+  for (std::size_t g = 0; g < grids.size(); ++g) try {
+      body(g);
+    } catch (Error& error) {
+      error.nameGrid(shownName(names[g]), unique.unique(g));
+      throw;
+    }
+}
+
+void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> fileMetadata,
+                  std::span<const GridToWrite> grids, const WriteOptions& options) {
+  initializeOpenVdb();
+  // An item names this library as the writer, unless the source's metadata has one.
+  openvdb::MetaMap metadata;
+  insertItems(fileMetadata, metadata);
+  if (!findItem(fileMetadata, kWriterKey))
+    insertItems(std::array{stringItem(kWriterKey, "esvr " ESVR_VERSION)}, metadata);
   std::ofstream stream(path, std::ios::binary);
   stream.exceptions(std::ios::badbit | std::ios::failbit);
   using namespace openvdb::io;
   const std::uint32_t compression =
       COMPRESS_ACTIVE_MASK |
       (openvdb::io::Archive::hasBloscCompression() ? COMPRESS_BLOSC : COMPRESS_ZIP);
-  ArchiveWriter writer(stream, compression, metadata, std::move(names));
-  for (const auto& grid : grids)
+  ArchiveWriter writer(stream, compression, metadata, namesOf(grids));
+  forEachNamed(grids, [&](std::size_t g) {
     std::visit(
         [&](const auto* any) {
           if constexpr (std::is_same_v<decltype(any), const CarriedGrid*>)
@@ -600,7 +619,8 @@ void writeOpenVdb(const std::filesystem::path& path, std::span<const MetaItem> f
           else
             writer.add(makeOpenVdbGrid(*any, options));
         },
-        grid);
+        grids[g]);
+  });
   stream.close();
 }
 

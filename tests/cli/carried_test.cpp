@@ -500,6 +500,17 @@ TEST_F(NonFiniteFile, keepsComponentsOfVectors) {
   }
 }
 
+/// Carried vectors are read again for a .nvdb file, which gets floats.
+TEST_F(NonFiniteFile, keepsCarriedVectorsInNanoVdb) {
+  InputVectors vectors{.voxels = softBall({}), .asDouble = true};
+  vectors.voxels[7].value = kInf;
+  writeVectorInput(in(), vectors);
+  succeeded(vdb2esvr({in(), out(), "--lossless"}));
+  const std::string nano = at("back.nvdb");
+  EXPECT_THAT(succeeded(esvr2vdb({out(), nano})).err, HasSubstr("rounded to floats"));
+  EXPECT_EQ(valueAt(readVector(nano, 0, kKeep).components[1], vectors.voxels[7].at), -kInf);
+}
+
 TEST_F(NonFiniteFile, isSharedByTwins) {
   writeInput(in(), {damagedBall(), damagedBall("copy")});
   convertKept("--max-error 0.01");

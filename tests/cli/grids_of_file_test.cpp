@@ -81,6 +81,22 @@ TEST_F(NamedGrids, AreToldWhereANameIsAmbiguous) {
   succeeded(vdb2esvr({in(), out(), "-g", "a[1]"}));
 }
 
+/// Texts of the library, of which some know the name in the file only, are about one grid, too.
+TEST_F(NamedGrids, AreToldByTheNamesThatFindThem) {
+  const std::vector<InputVoxel> far{{{100, 0, 0}, 1e38f}};
+  writeInput(in(), {{.name = "a", .voxels = softBall({})},
+                    {.name = "a", .voxels = far},
+                    {.name = "a", .voxels = softBall({}), .map = InputMap::kFrustum}});
+  EXPECT_THAT(vdb2esvr({in(), out(), "--representation", "ellipsoids"}), Fails(3, "'a[1]'"));
+  succeeded(vdb2esvr({in(), out(), "--lossless"}));
+  const std::string back = at("back.vdb");
+  EXPECT_THAT(succeeded(esvr2vdb({out(), back, "--bbox", "-2,-2,-2,2,2,2"})).err,
+              HasSubstr("grid \"a[1]\" comes back without an active voxel"));
+  EXPECT_THAT(esvr2vdb({out(), back, "-f", "--coarsen", "2"}), Fails(2, "'a[2]'"));
+  EXPECT_THAT(esvr2vdb({out(), back, "-f", "--half", "on"}), Fails(2, "\"a[1]\""));
+  EXPECT_THAT(esvr2vdb({out(), at("back.nvdb")}), Fails(2, "\"a[2]\""));
+}
+
 TEST_F(NamedGrids, AreComparedWithThoseThatTheyComeFromAfterOthersWereLeftOut) {
   write("a a a");
   thereAndBack("--lossless --skip a[0]");

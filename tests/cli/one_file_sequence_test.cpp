@@ -195,6 +195,9 @@ TEST_F(OneFile, isContinuedAfterItStopped) {
   EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "whole.esvr"));
   EXPECT_THAT(convert(), Fails(1, "out.esvr.partial", "--resume"));
   EXPECT_THAT(convert("--resume --frames 2-20"), Fails(2, "has frame 1"));
+  for (const char* other :
+       {"--resume --effort 6", "--resume --nonfinite keep", "--resume -g density"})
+    EXPECT_THAT(convert(other), Fails(2, "was begun with other options"));
   writeFrames(0, 0);
   EXPECT_THAT(convert("--resume"), Fails(2, "has other groups"));
 
@@ -211,14 +214,16 @@ TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
   const std::string whole = bytesOf("whole.esvr");
   const SequenceReader reader(at("whole.esvr"));
   const std::uint64_t second = reader.frames()[kGroup].offset;
+  // The header of a file that is not complete says that the file has no bytes and no sections, and what was asked for.
+  fs::rename(at("in.18.vdb"), at("in.eighteen"));
+  writeText(at("in.18.vdb"), "no volume");
+  EXPECT_THAT(convert("--on-error stop --threads 1"), Fails(3));
+  const std::string header = bytesOf("out.esvr.partial").substr(0, 48);
+  fs::rename(at("in.eighteen"), at("in.18.vdb"));
   for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{30}, second - 1, second + 9}) {
     writeText(at("out.esvr.partial"), "");
     std::string left = whole.substr(0, bytes);
-    // The header of a file that is not complete says that the file has no bytes and no sections.
-    if (left.size() >= 48) {
-      SequenceWriter empty(at("empty.esvr"));
-      left.replace(0, 48, bytesOf("empty.esvr.partial"));
-    }
+    if (left.size() >= header.size()) left.replace(0, header.size(), header);
     writeText(at("out.esvr.partial"), left);
     succeeded(convert("--resume"));
     EXPECT_TRUE(bytesOf("out.esvr") == whole) << bytes;

@@ -66,6 +66,18 @@ TEST(ChoiceForAPsnr, SlowStoresTheRepresentationThatIsInsistedOn) {
   EXPECT_FALSE(choose(volume, PsnrGoal{35.0}, Representation::kEllipsoids).grid.voxels);
 }
 
+/// Neither has figures of ellipsoids, for which nothing was fitted.
+TEST(ChoiceForAPsnr, BeyondSumsOfFloatsTakesVoxels) {
+  const SparseVolume volume = test::smoothVolume();
+  const Conversion fine = choose(volume, PsnrGoal{120.0}), exact = choose(volume, PsnrGoal{200.0});
+  EXPECT_GE(psnrOver(volume, fine), 120.0);
+  EXPECT_EQ(decodeGrid(exact.grid).values, volume.values);
+  for (const Conversion* made : {&fine, &exact}) {
+    EXPECT_TRUE(made->grid.voxels);
+    EXPECT_FALSE(made->choice->ellipsoids);
+  }
+}
+
 TEST(ChoiceForAPsnr, ThatIsCancelledBeforeItBeginsHasNoResult) {
   const SparseVolume volume = test::smoothVolume();
   CancelToken cancel;

@@ -21,6 +21,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "support/files.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -149,6 +150,33 @@ TEST(ConvertGrids, LetsVoxelsReferToThoseOfAnotherGrid) {
   EXPECT_LT(figure, bytesApart + 8);
 }
 
+/// A bound is one of the doubles, and so is the range of one in percent.
+TEST(ConvertGrids, LeavesRoomInABoundForWhatFloatsLoseOfDoubles) {
+  const SparseVolume ball = softBall({}, 1.0f);
+  VolumeGrid grid;
+  grid.descriptor.name = "d";
+  grid.descriptor.valueType = ValueType::kDouble;
+  grid.volume = ball;
+  grid.narrowing.add(0.004, 0.0f, {});
+  grid.narrowing.add(1.0, 1.0f, {});
+  const auto convert = [&](const Goal& goal) {
+    FileSource file = fileOf({{"d", ball}});
+    file.grids.front().read = [grid] { return grid; };
+    return convertGrids(file, fileOptions(goal)).file.grids.front();
+  };
+  for (const auto& [goal, bound] : {std::pair<Goal, double>{BoundGoal{0.01}, 0.01 - 0.004},
+                                    {BoundGoal{0.01, true}, 0.01 - 0.004},
+                                    {RelativeBoundGoal{0.02, 0.5}, 0.02 - 0.008}}) {
+    const double most = compareVolumes(ball, decodeGrid(convert(goal))).maxError;
+    EXPECT_LE(most, bound + 1e-9);
+    EXPECT_GT(most, 0.5 * bound);
+  }
+  for (const Goal& goal :
+       {Goal{BoundGoal{0.004}}, Goal{BoundGoal{0.004, true}}, Goal{RelativeBoundGoal{0.5}}})
+    EXPECT_THAT([&] { (void)convert(goal); },
+                test::ThrowsSaying<CannotConvert>("floats differ from its doubles"));
+}
+
 TEST(ConvertGrids, KeepsTheGoalsOfSingleGridsWhileTheyShare) {
   const SparseVolume density = softBall({}, 1.0f), heat = softBall({}, 40.0f);
   FileSource file = fileOf({{"density", density}, {"heat", heat}});
@@ -228,6 +256,21 @@ TEST(ConvertGridsToSize, OfManyGridsIsNearlyUsedUp) {
   constexpr std::uint64_t kSize = 10'000;
   const SparseVolume cloud = test::smoothVolume();
   std::vector<std::pair<std::string, SparseVolume>> grids;
+  for (int g = 0; g < 12; ++g) {
+    grids.push_back({"grid " + std::to_string(g), cloud});
+    for (float& value : grids.back().second.values) value *= float(g + 1);
+  }
+  const std::uint64_t bytes =
+      encodeEsvr(convertGrids(fileOf(grids), sizedOptions(kSize)).file).size();
+  EXPECT_LE(bytes, kSize);
+  EXPECT_GE(double(bytes), 0.9 * double(kSize));
+}
+
+/// Also if a grid among them needs more bytes than its share.
+TEST(ConvertGridsToSize, OfManyGridsIsNearlyUsedUpBesideOneThatNeedsMore) {
+  constexpr std::uint64_t kSize = 10'000;
+  const SparseVolume cloud = test::smoothVolume();
+  std::vector<std::pair<std::string, SparseVolume>> grids{{longName(), softBall({}, 1.0f, 3.0)}};
   for (int g = 0; g < 12; ++g) {
     grids.push_back({"grid " + std::to_string(g), cloud});
     for (float& value : grids.back().second.values) value *= float(g + 1);

@@ -26,6 +26,7 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/volume.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -177,6 +178,14 @@ TEST(OtherLevelSets, AreConvertedLikeOtherGrids) {
     const Conversion conversion = bandOf(*volume, PsnrGoal{30.0}, Representation::kVoxels);
     EXPECT_TRUE(conversion.grid.voxels);
   }
+  // No sum has the inside of a surface with a hole.
+  const auto fitted = [&](const Goal& goal) {
+    return bandOf(hole, goal, Representation::kEllipsoids);
+  };
+  EXPECT_THAT([&] { (void)fitted(PsnrGoal{40.0}); },
+              test::ThrowsSaying<BadInput>("ellipsoids reach at most"));
+  // Its active voxels can be fitted nevertheless.
+  EXPECT_GE(compareVolumes(hole, decodeGrid(fitted(PresetGoal{}).grid)).psnrActive, 30.0);
 }
 
 TEST(RequireSigns, NamesTheGridAndTheVoxel) {

@@ -398,6 +398,22 @@ TEST_F(SequenceFile, IsResumedWhereOnlyItsNameIsMissing) {
   EXPECT_EQ(bytesIn(path()), whole);
 }
 
+TEST_F(SequenceFile, IsResumedWithTheSameOriginOnly) {
+  const auto begin = [&](std::uint64_t origin) {
+    return SequenceWriter(path(), {.partial = PartialSequence::kResume, .origin = origin});
+  };
+  {
+    SequenceWriter writer(path(), {.origin = 7});
+    append(writer, kGroups[0]);
+    writer.endGroup();
+  }
+  for (const std::uint64_t other : {0, 8})
+    EXPECT_THAT([&] { (void)begin(other).groupCount(); },
+                test::ThrowsSaying<UsageError>("begun with other options"));
+  SequenceWriter writer(path(), {.partial = PartialSequence::kResume, .origin = 7});
+  EXPECT_EQ(writer.groupCount(), 1);
+}
+
 TEST_F(SequenceFile, DropsGroupsThatAreWrittenAgain) {
   writeSequence(path(), kGroups);
   const auto whole = bytesIn(path());

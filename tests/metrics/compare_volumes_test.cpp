@@ -417,6 +417,24 @@ TEST(CompareVectors, CountsVoxelsThatAreActiveInOneComponent) {
   EXPECT_TRUE(std::isinf(m.magnitude.psnrBox));
 }
 
+/// One voxel of a volume has lost 0.25.
+TEST(CompareVectors, AddWhatFloatsLoseOfDoubles) {
+  const SparseVolume floats = constant(4.0f);
+  Narrowing lost;
+  lost.add(4.25, 4.0f, {});
+  const double voxels = double(activeVoxelCount(floats));
+  const VolumeMetrics exact = compareVolumes(floats, floats, {.narrowing = lost});
+  EXPECT_EQ(exact.maxError, 0.25);
+  EXPECT_DOUBLE_EQ(exact.mseActive, 0.0625 / voxels);
+  EXPECT_DOUBLE_EQ(exact.psnrActive, psnr(0.0625 / voxels, 4.0));
+  EXPECT_EQ(compareVolumes(floats, constant(4.5f), {.narrowing = lost}).maxError, 0.75);
+  const VectorMetrics vectors = compareVectors({floats, floats, floats}, {floats, floats, floats},
+                                               {}, {Narrowing{}, lost, lost});
+  EXPECT_EQ(vectors.components[0].maxError, 0.0);
+  EXPECT_EQ(vectors.components[1].maxError, 0.25);
+  EXPECT_DOUBLE_EQ(vectors.magnitude.maxError, std::sqrt(2.0) * 0.25);
+}
+
 TEST(CompareVectors, TakesAGivenPeak) {
   const VectorMetrics m = compareVectors(constants(0, 0, 0), constants(0, 0, 1), {.peak = 10.0});
   EXPECT_NEAR(m.components[2].psnrActive, 20.0, 1e-9);  // float64 rounding

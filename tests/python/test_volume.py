@@ -73,6 +73,13 @@ def test_rounded_doubles_are_counted():
     assert esvr.Volume.from_numpy(np.full((9, 9, 9), 1 / 3)).rounded_values == 729
 
 
+def test_rounded_doubles_of_a_file_are_counted(tmp_path):
+    builder = esvr.GridBuilder("double")
+    builder.add(np.array([[[0.5, 0.1, 0.2, 1e-60]]]))
+    esvr.write_vdb(tmp_path / "a.vdb", [builder.finish()])
+    assert esvr.Volume.from_vdb(tmp_path / "a.vdb").rounded_values == 3
+
+
 @pytest.mark.parametrize("array, text", [
     (np.array([[["2020-01-01"]]], dtype="datetime64[D]"), "datetime64"),
     (np.zeros((1, 1, 1), dtype="timedelta64[s]"), "timedelta64"),

@@ -292,6 +292,33 @@ TEST_F(Voxels, DoublesAreNarrowedToTheNearestFloat) {
   EXPECT_EQ(valueAt(grid.volume, {0, 0, 2}), 1e30f);
 }
 
+TEST_F(Voxels, DoublesSayWhatFloatsLose) {
+  openvdb::initialize();
+  auto source = openvdb::DoubleGrid::create(0.1);
+  source->tree().setValue({0, 0, 0}, 0.1);
+  source->tree().setValue({0, 0, 1}, 1e-50);
+  source->tree().setValue({0, 0, 2}, 0.25);
+  const Narrowing lost = saveAndRead(source).narrowing;
+  EXPECT_EQ(lost.errors.count(), 2);
+  EXPECT_EQ(lost.largest(), double(0.1f) - 0.1);
+  EXPECT_EQ(lost.relative, 1.0) << "nothing is left of 1e-50";
+  EXPECT_EQ(lost.min, 1e-50);
+  EXPECT_EQ(lost.max, 0.25);
+  EXPECT_EQ(lost.relativeAbove(0.5), 2.0 * lost.largest());
+  EXPECT_EQ(between(lost, lost).largest(), 0.0);
+  EXPECT_EQ(between(lost, {}).largest(), lost.largest());
+}
+
+TEST_F(Voxels, DoublesThatAreAllTooSmallForFloatAreRefused) {
+  openvdb::initialize();
+  for (const double value : {1e-50, -1.23e-41}) {
+    auto source = openvdb::DoubleGrid::create(0.0);
+    source->tree().setValue({5, 6, 7}, value);
+    EXPECT_THAT([&] { (void)saveAndRead(source); },
+                test::ThrowsSaying<CannotConvert>("too small for float"));
+  }
+}
+
 TEST_F(Voxels, DoublesBeyondFloatCountAsNonFinite) {
   openvdb::initialize();
   auto source = openvdb::DoubleGrid::create(0.0);

@@ -379,7 +379,8 @@ File convertSource(const ConvertedSource& given, const ConvertOptions& options, 
 void tellLostValues(const Volume& volume) {
   const InactiveValues& inactive = volume.grid->inactive;
   if (inactive.count() == 0) return;
-  const std::string text = "grid '" + volume.grid->descriptor.name + "' loses " + toText(inactive) +
+  const std::string text = "grid '" + shownName(volume.grid->descriptor.name) + "' loses " +
+                           toText(inactive) +
                            "; the program vdb2esvr keeps them with --lossless or --keep";
   if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
 }

@@ -312,13 +312,18 @@ constexpr const char* kWayOut =
 
 constexpr const char* kKeepsThem = "; nonfinite='keep' keeps such values";
 
+Volume fromFile(VolumeGrid grid) {
+  const std::uint64_t rounded = grid.narrowing.errors.count();
+  return {std::make_shared<const VolumeGrid>(std::move(grid)), rounded};
+}
+
 Volume fromVdb(const std::filesystem::path& path, const std::optional<std::string>& name,
                NonFinite nonFinite) {
   const ReadOptions read{.nonFinite = nonFinite};
   return interruptible([&] {
     try {
-      return Volume{std::make_shared<const VolumeGrid>(
-          name ? readGrid(path, *name, read) : readGrid(path, firstOfNumbers(path), read))};
+      return fromFile(name ? readGrid(path, *name, read)
+                           : readGrid(path, firstOfNumbers(path), read));
     } catch (const NotFinite& error) {
       throw BadInput(error.what() + std::string(kKeepsThem) + kWayOut);
     } catch (const CannotConvert& error) {
@@ -334,8 +339,7 @@ Volume fromOnlyGrid(const std::filesystem::path& path, NonFinite nonFinite) {
   return interruptible([&] {
     constexpr std::size_t kOnly = 0;
     try {
-      return Volume{std::make_shared<const VolumeGrid>(
-          readGrid(path, kOnly, {.nonFinite = nonFinite, .allowEmpty = true}))};
+      return fromFile(readGrid(path, kOnly, {.nonFinite = nonFinite, .allowEmpty = true}));
     } catch (const NotFinite& error) {
       throw BadInput(error.what() + std::string(kKeepsThem));
     }

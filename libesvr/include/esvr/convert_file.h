@@ -81,6 +81,7 @@ struct SourceKey {
   InputKey voxels;
   std::optional<double> peak{}, range{};  ///< of vectors: peakOfVectors() and valueRangeOfVectors()
   std::optional<Goal> goal{};             ///< GridSource::goal
+  double narrowing = 0.0;                 ///< Narrowing::largest(), which a bound has to allow for
   friend auto operator<=>(const SourceKey&, const SourceKey&) = default;
 };
 

@@ -19,12 +19,24 @@ enum class ErrorKind {
 
 class Error : public std::runtime_error {
  public:
-  Error(ErrorKind kind, const std::string& what) : std::runtime_error(what), kind_(kind) {}
+  Error(ErrorKind kind, const std::string& what)
+      : std::runtime_error(what), kind_(kind), text_(what) {}
+  [[nodiscard]] const char* what() const noexcept override { return text_.c_str(); }
   [[nodiscard]] ErrorKind kind() const noexcept { return kind_; }
   [[nodiscard]] int exitCode() const noexcept { return static_cast<int>(kind_); }
+  /// Gives a grid that the text names the name by which users find it, if that is another one.
+  /// \param stored  shownName() of its descriptor. \param unique  as of GridNames
+  void nameGrid(const std::string& stored, const std::string& unique) {
+    for (const char quote : {'\'', '"'}) {
+      const std::string quoted = quote + stored + quote;
+      if (const auto at = text_.find(quoted); at != std::string::npos && stored != unique)
+        text_.replace(at + 1, stored.size(), unique);
+    }
+  }
 
  private:
   ErrorKind kind_;
+  std::string text_;
 };
 
 struct RuntimeFailure : Error {

@@ -1,11 +1,13 @@
 #pragma once
 /// Grids: volumes with a name, a class and a transform, as the files of applications have them.
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -204,12 +206,42 @@ class InactiveValues {
 /// For messages: "2 inactive values (5, first at (1, 2, 3))", "9 inactive values (-2.5 to -2, ...)".
 [[nodiscard]] std::string toText(const InactiveValues& values);
 
+/// What active doubles lose because a volume holds floats; nothing for the values of other grids.
+struct Narrowing {
+  InactiveValues errors;  ///< value - float(value) at the voxels where it is not 0
+  double squares = 0.0;   ///< sum of the squared errors
+  double relative = 0.0;  ///< largest error relative to its value
+  double min = std::numeric_limits<double>::infinity();  ///< of the doubles
+  double max = -min;
+
+  void add(double value, float rounded, Coord at) {
+    min = std::min(min, value);
+    max = std::max(max, value);
+    if (double(rounded) != value) addError(value, value - double(rounded), at);
+  }
+  [[nodiscard]] double largest() const { return std::max(-errors.min(), errors.max()); }
+  /// At least the largest error relative to magnitudes, smaller ones of which count as `floor`.
+  [[nodiscard]] double relativeAbove(const std::optional<double>& floor) const {
+    return floor ? std::min(relative, largest() / *floor) : relative;
+  }
+
+ private:
+  void addError(double value, double error, Coord at);
+};
+
+using VectorNarrowing = std::array<Narrowing, 3>;  ///< of three components
+
+/// By how much the values of two grids can differ more than their floats: not at all if the same is lost.
+[[nodiscard]] Narrowing between(const Narrowing& a, const Narrowing& b);
+[[nodiscard]] VectorNarrowing between(const VectorNarrowing& a, const VectorNarrowing& b);
+
 /// A grid of numbers with its voxels.
 struct VolumeGrid {
   GridDescriptor descriptor;
   SparseVolume volume;
   std::uint64_t nonFiniteReplaced = 0;  ///< voxels that a reader replaced (NonFinite, vdb_io.h)
   InactiveValues inactive{};            ///< of the file; the volume does not hold them
+  Narrowing narrowing{};
 };
 
 // Grids of vectors. A vector grid is read, fitted and stored as three volumes, one for each
@@ -226,6 +258,7 @@ struct VectorGrid {
   VectorVolume components;
   std::uint64_t nonFiniteReplaced = 0;  ///< components replaced as NonFinite says
   InactiveValues inactive{};            ///< of the components together
+  VectorNarrowing narrowing{};
 };
 
 /// The name of a component: that of the grid with ".x", ".y" or ".z".

@@ -70,6 +70,9 @@ struct CompareOptions {
   std::optional<double> peak{};  ///< peak of the PSNR; default: peakOf(reference)
   bool ssim = false;             ///< whether 3D SSIM is computed, which takes most of the time
   bool transmittance = false;    ///< whether the PSNR of the transmittance is computed
+  /// What the volumes have lost of doubles. The errors are those of the doubles, or up to so much larger, but for the
+  /// PSNR of the transmittance and SSIM.
+  Narrowing narrowing{};
 };
 
 struct VolumeMetrics {
@@ -183,7 +186,8 @@ struct VectorMetrics {
 /// \throws BadInput, UsageError  as for compareVolumes
 [[nodiscard]] VectorMetrics compareVectors(const VectorVolume& reference,
                                            const VectorVolume& candidate,
-                                           const CompareOptions& options = {});
+                                           const CompareOptions& options = {},
+                                           const VectorNarrowing& narrowing = {});
 
 // The error of the change of a grid from one frame of a sequence to the next. Errors that differ
 // from frame to frame are seen as flicker, even if each frame is close to its reference.

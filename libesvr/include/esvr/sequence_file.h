@@ -36,6 +36,8 @@ enum class PartialSequence {
 struct SequenceWriteOptions {
   bool overwrite = false;  ///< replace a file that exists
   PartialSequence partial = PartialSequence::kRefuse;
+  std::uint64_t origin =
+      0;  ///< a hash of what decides the frames; a partial file of another one is not continued
 };
 
 /// Writes a sequence to PATH.partial, group by group, and renames the file when it is complete.
@@ -47,6 +49,7 @@ class SequenceWriter {
   /// Creates the partial file, or continues it after its last complete group.
   /// \throws RuntimeFailure  the file exists (without overwrite), or the partial file (kRefuse); it
   ///                         is not writable; another process writes it
+  /// \throws UsageError  the partial file to resume has another origin
   /// \throws BadInput  the partial file to resume is not that of a sequence of this version
   SequenceWriter(const std::filesystem::path& path, const SequenceWriteOptions& options = {});
   /// Leaves the partial file, unless it has no group.
