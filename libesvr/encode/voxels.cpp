@@ -391,6 +391,7 @@ std::optional<VoxelSearch::Tried> VoxelSearch::thriftyForPsnr(const Tried& plain
 
 void VoxelSearch::tryForPsnr() {
   const double psnr = *goal_.psnr;
+  if (exactIsBest()) return;
   const Setting first{psnr / kDbPerOctave - 1.0};
   std::optional<Tried> with;
   if (hasPlateau() && !job_.options.previous && range_ > 0.0) {
@@ -407,8 +408,22 @@ void VoxelSearch::tryForPsnr() {
   considerPlateau(std::move(with));
   const double active = double(std::max<std::uint64_t>(activeVoxelCount(job_.input.source), 1));
   const double bits = best_ ? 8.0 * double(best_->bytes) / active : HUGE_VAL;
-  if (bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
+  if (!exact_ && bits >= leastBitsOfExact(smallestExactLayer(tryOn_).form))
     exact_ = job_.options.previous ? exactVoxels(job_).bytes : exactBytes();
+}
+
+/// True if exact voxels take hardly more bytes than their active mask, which all voxels of the grid need.
+bool VoxelSearch::exactIsBest() {
+  if (voxelActivity(job_) != Activity::kExact || job_.options.previous || isToned(job_))
+    return false;
+  VoxelLayer exact = smallestExactLayer(tryOn_);
+  if (exact.form != VoxelForm::kPalette) return false;
+  exact_ = exactBytes();
+  VoxelLayer bare = exact;
+  std::fill(bare.codes.begin(), bare.codes.end(), 0);
+  const double least =
+      bytesOfCodes(bare) / (bytesOfCodes(exact) / double(*exact_ - besides_)) + double(besides_);
+  return double(*exact_) <= std::max(kExactFactor * least, least + double(kExactBytes));
 }
 
 /// Takes a lattice with the plateau where it is better.

@@ -99,6 +99,7 @@ class VoxelSearch {
   [[nodiscard]] std::uint64_t exactBytes() const;
   void matchJudge();
   void trySettings();
+  [[nodiscard]] bool exactIsBest();
   void tryForPsnr();
   void tryForSize();
   void considerPlateau(std::optional<Tried> with);

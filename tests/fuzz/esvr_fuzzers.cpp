@@ -225,7 +225,8 @@ void resume(const InputFile& partial) {
   try {
     const std::size_t frames = finish(path);
     require(frames == 0 || SequenceReader(path).frames().size() == frames);
-  } catch (const BadInput&) {  // no partial file
+  } catch (const BadInput&) {    // no partial file
+  } catch (const UsageError&) {  // that of a run with other options
   }
   std::filesystem::remove(path);
 }
