@@ -1,4 +1,6 @@
 #pragma once
+/// Numbers in messages. The decoder of the page uses them, and must not get the locales of the C++ library with a stream.
+
 #include <cstdint>
 #include <cstdio>
 #include <string>
@@ -12,8 +14,7 @@ namespace esvr {
 
 /// A number for a message, for example "1e-50".
 [[nodiscard]] inline std::string shortText(double value) {
-  char
-      text[32];  // a stream would bring the locales of the C++ library into the decoder of the page
+  char text[32];
   std::snprintf(text, sizeof text, "%g", value);
   return text;
 }

@@ -4,13 +4,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <limits>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/grid_coding.h"
 #include "esvr/volume.h"
@@ -53,18 +53,14 @@ std::string whyImprecise(const StoredGrid& grid) {
     for (const float i : chunk.ellipsoids.intensity)
       largest = std::max(largest, std::abs(double(i)));
   }
-  const auto number = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", value);
-    return std::string(text);
-  };
   if (sharpest > kSharpest)
-    return "an edge has a sharpness of " + number(sharpest) + ", for which float32 has few digits";
+    return "an edge has a sharpness of " + shortText(sharpest) +
+           ", for which float32 has few digits";
   double peak = std::abs(double(grid.field.background));
   for (const float end : {grid.valueMin, grid.valueMax})
     peak = std::max(peak, std::abs(double(grid.tone.isOn() ? grid.tone.of(end) : end)));
   if (peak > 0.0 && largest > kMostCancelled * peak)
-    return "its ellipsoids are " + number(largest / peak) +
+    return "its ellipsoids are " + shortText(largest / peak) +
            " times as large as its values and cancel each other, for which float32 has few digits";
   return {};
 }
