@@ -765,7 +765,10 @@ Conversion EllipsoidSearch::smallestOrBest() {
     const auto before = std::exchange(reached_, std::nullopt);
     Conversion now = storedForPsnr(std::move(*a));
     const std::uint64_t bytes = bytesOfEllipsoids(now.grid);
-    if (!smallest || bytes < fewest)
+    // Rounding may miss it.
+    const bool misses = now.fit.end == FitEnd::kPsnrMissed;
+    const bool missed = smallest && smallest->fit.end == FitEnd::kPsnrMissed;
+    if (!smallest || (misses != missed ? missed : bytes < fewest))
       smallest = std::move(now), fewest = bytes;
     else
       reached_ = before;

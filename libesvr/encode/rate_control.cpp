@@ -496,9 +496,17 @@ CompactResult Compactor::at(const QuantiserSteps& steps) {
 }
 
 JudgedResult Compactor::toQuality(const JudgedGoal& goal) {
-  CompactResult made = goal.first ? at(*goal.first)
-                       : trials_  ? resultOf(chosen(*trials_, options_, false))
-                                  : toGoal();
+  if (!trials_) return scaledTo(goal, toGoal());
+  JudgedResult best =
+      scaledTo(goal, goal.first ? at(*goal.first) : resultOf(chosen(*trials_, options_, false)));
+  if (best.quality >= goal.quality || CancelScope::cancelled()) return best;
+  // Of a dozen ellipsoids, the quality jumps. Steps that were searched for may have it.
+  auto again = unlessCancelled([&] { return std::optional(scaledTo(goal, toGoal())); });
+  return again && again->quality > best.quality ? std::move(*again) : std::move(best);
+}
+
+/// Scales the steps of a first result until its quality is the wanted one.
+JudgedResult Compactor::scaledTo(const JudgedGoal& goal, CompactResult made) {
   const QuantiserSteps steps = made.steps;
   RootSearch search({-kMostFiner, kMostFiner, kNarrowestFiner}, goal.quality + 0.5 * kQualitySpare,
                     std::log(4.0) * goal.loss, 0.0);

@@ -162,6 +162,7 @@ class Compactor {
   [[nodiscard]] JudgedResult toQuality(const JudgedGoal& goal);
 
  private:
+  [[nodiscard]] JudgedResult scaledTo(const JudgedGoal& goal, CompactResult made);
   [[nodiscard]] CompactResult resultOf(RateTrial trial);
 
   const StoredGrid& grid_;
