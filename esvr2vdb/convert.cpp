@@ -400,7 +400,7 @@ void tellImprecise(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
     if (grid.isCarried) continue;
     for (const StoredGrid& part : storedParts(file, grid))
       if (const std::string why = whyImprecise(part); !why.empty())
-        log.warning("grid \"" + shownName(name) + "\": " + why);
+        log.warning("grid \"" + name + "\": " + why);
   }
 }
 

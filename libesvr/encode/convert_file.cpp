@@ -110,7 +110,7 @@ void GridConverter::step(std::size_t g, bool isAlone,
                          const std::function<void(const FitOptions&)>& run) {
   FitOptions own = fit_;
   FitOptions& fit = isAlone ? fit_ : own;
-  fit.progress = options_.convert.fit.progress;  // that of another step may be gone
+  fit.progress = options_.convert.fit.progress;  // the one of an earlier step may be gone
   const std::function<void()> withOptions = [&] { run(fit); };
   if (options_.onStep)
     options_.onStep({g, isAlone, fit, withOptions});

@@ -765,7 +765,7 @@ Conversion EllipsoidSearch::smallestOrBest() {
     const auto before = std::exchange(reached_, std::nullopt);
     Conversion now = storedForPsnr(std::move(*a));
     const std::uint64_t bytes = bytesOfEllipsoids(now.grid);
-    // Rounding may miss it.
+    // Rounding may take a fit below the PSNR.
     const bool misses = now.fit.end == FitEnd::kPsnrMissed;
     const bool missed = smallest && smallest->fit.end == FitEnd::kPsnrMissed;
     if (!smallest || (misses != missed ? missed : bytes < fewest))

@@ -15,8 +15,9 @@ class Judge;
 
 /// What a search is to reach: a quality in few bytes, or a size with a good quality.
 struct Aim {
-  std::optional<double> psnr{};          ///< dB, as the job measures it
-  std::optional<std::uint64_t> bytes{};  ///< that the grid may add to a file, without a PSNR
+  std::optional<double> psnr{};  ///< dB, as the job measures it
+  std::optional<std::uint64_t>
+      bytes{};  ///< the bytes that the grid may add to a file, without a PSNR
 };
 
 /// The quality, dB, of a fit for which a number of ellipsoids was wanted.

@@ -99,6 +99,9 @@ TEST_F(VoxelSearch, TakesExactVoxelsThatTakeLittleMoreThanTheirMask) {
   volume_ =
       test::volumeOf({}, 3, 0.0f, [&](Coord) { return random(0.0, 1.0) < 0.4 ? 0.7f : 0.0f; });
   EXPECT_EQ(decodeGrid(forPsnr(30.0).grid).values, volume_.values);
+  volume_ =
+      test::volumeOf({}, 3, 0.0f, [&](Coord) { return float(int(random(1.0, 200.0))) / 200.0f; });
+  EXPECT_NE(decodeGrid(forPsnr(30.0).grid).values, volume_.values) << "many values take more";
 }
 
 TEST_F(VoxelSearch, PutsAPlateauOnTheLattice) {
