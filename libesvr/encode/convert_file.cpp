@@ -287,6 +287,12 @@ namespace {
 using encode::GridConverter;
 using encode::SizeTooSmall;
 
+/// True for a grid whose conversion keeps few threads busy: its voxels are coded in one or two blocks, each on one thread.
+bool isSmall(const GridSource& grid) {
+  constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
+  return grid.activeVoxels <= kMostActive;
+}
+
 // Grids of equal voxels.
 
 /// A grid whose conversion is that of an earlier grid, with a descriptor of its own.
@@ -310,19 +316,33 @@ bool mayHaveTwin(const std::vector<GridSource>& grids, const GridSource& grid) {
 /// Finds the grids that have the voxels of a grid before them, and the same scale and goal. A key takes few
 /// bytes, so that no volume has to be kept for a comparison.
 Twins findTwins(const std::vector<GridSource>& grids, GridConverter& converter) {
-  std::map<SourceKey, std::size_t> firstBy;
-  Twins twins;
-  for (std::size_t g = 0; g < grids.size() && !converter.isCancelled(); ++g) {
-    if (!mayHaveTwin(grids, grids[g])) continue;
+  std::vector<std::size_t> candidates;
+  for (std::size_t g = 0; g < grids.size(); ++g)
+    if (mayHaveTwin(grids, grids[g])) candidates.push_back(g);
+  std::vector<std::optional<Twin>> read(grids.size());
+  const auto readOne = [&](std::size_t g) {
     VolumeGrid grid;
     const double seconds = secondsOf(
-        [&] { converter.step(g, true, [&](const FitOptions&) { grid = converter.read(g); }); });
-    const SourceKey key = converter.keyOf(g, grid);
-    const auto [first, isNew] = firstBy.emplace(key, g);
-    if (!isNew)
-      twins[g] = {
-          first->second, std::move(grid.descriptor), grid.nonFiniteReplaced, grid.inactive, key,
-          seconds};
+        [&] { converter.step(g, false, [&](const FitOptions&) { grid = converter.read(g); }); });
+    read[g] = {g,
+               std::move(grid.descriptor),
+               grid.nonFiniteReplaced,
+               grid.inactive,
+               converter.keyOf(g, grid),
+               seconds};
+  };
+  const bool areSmall =
+      std::ranges::all_of(candidates, [&](std::size_t g) { return isSmall(grids[g]); });
+  encode::forEachAtOnce(candidates.size(), areSmall ? converter.mostAtOnce() : 1,
+                        [&](std::size_t i) { readOne(candidates[i]); });
+  std::map<SourceKey, std::size_t> firstBy;
+  Twins twins;
+  for (const std::size_t g : candidates) {
+    if (!read[g]) continue;  // it was cancelled
+    const auto [first, isNew] = firstBy.emplace(read[g]->key, g);
+    if (isNew) continue;
+    read[g]->of = first->second;
+    twins[g] = std::move(*read[g]);
   }
   return twins;
 }
@@ -553,15 +573,16 @@ class GridsConversion {
   /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
   /// keeps few threads and little of a GPU busy.
   void convertSmall() {
-    // The voxels of such a grid are coded in one or two blocks, each on one thread.
-    constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
     // A single fit takes the time that was asked for, and shows its progress.
     const ConvertOptions& convert = options_.convert;
     if (convert.fit.seconds || std::holds_alternative<FitGoal>(convert.goal)) return;
     if (options_.size || !options_.severalAtOnce || source_.grids.size() < 2) return;
     std::vector<std::size_t> small;
     for (std::size_t g = 0; g < made_.size(); ++g)
-      if (!twins_.contains(g) && source_.grids[g].activeVoxels <= kMostActive) small.push_back(g);
+      if (!twins_.contains(g) && isSmall(source_.grids[g])) small.push_back(g);
+    // The largest come first, so that none of them is left alone at the end.
+    std::ranges::stable_sort(small, std::ranges::greater(),
+                             [&](std::size_t g) { return source_.grids[g].activeVoxels; });
     encode::forEachAtOnce(small.size(), converter_.mostAtOnce(), [&](std::size_t i) {
       try {
         made_[small[i]] = converter_.make(small[i], {}, false);
@@ -684,20 +705,36 @@ std::uint64_t bytesOfVector(const std::vector<GridConversion>& grids, const Stor
 
 /// Carries the vectors that take fewer bytes unchanged than as converted components, unless an option
 /// prescribes the representation or a size.
-void carrySmallerVectors(const FileOptions& options, FileSource& source, ConvertedFile& made) {
+void carrySmallerVectors(const FileOptions& options, const GridConverter& converter,
+                         FileSource& source, ConvertedFile& made) {
   if (options.convert.representation != Representation::kAuto ||
       options.convert.storage.form != Storage::kCompact || options.size)
     return;
-  for (const StoredVector& vector : vectorsOf(source.grids, made.grids)) {
-    const GridSource& grid = source.grids[made.grids[vector.first].source];
-    if (!grid.readCarried) continue;
-    std::vector<CarriedGrid> unchanged{grid.readCarried()};
-    const std::uint64_t bytes = bytesOfVector(made.grids, vector);
-    if (bytesOfCarried(unchanged) >= bytes) continue;
-    made.carriedVectors.push_back({grid.place, bytes});
-    const auto at = std::ranges::lower_bound(source.carried, grid.place, {}, &CarriedGrid::place);
-    unchanged.front().place = std::uint32_t(grid.place);
-    source.carried.insert(at, std::move(unchanged.front()));
+  const std::vector<StoredVector> vectors = vectorsOf(source.grids, made.grids);
+  const auto gridOf = [&](const StoredVector& vector) -> const GridSource& {
+    return source.grids[made.grids[vector.first].source];
+  };
+  struct Unchanged {
+    std::vector<CarriedGrid> grid;  ///< empty: the components are smaller
+    std::uint64_t bytesOfComponents = 0;
+  };
+  std::vector<Unchanged> unchanged(vectors.size());
+  const bool areSmall = std::ranges::all_of(
+      vectors, [&](const StoredVector& vector) { return isSmall(gridOf(vector)); });
+  encode::forEachAtOnce(vectors.size(), areSmall ? converter.mostAtOnce() : 1, [&](std::size_t v) {
+    if (!gridOf(vectors[v]).readCarried) return;
+    std::vector<CarriedGrid> whole{gridOf(vectors[v]).readCarried()};
+    const std::uint64_t bytes = bytesOfVector(made.grids, vectors[v]);
+    if (bytesOfCarried(whole) < bytes) unchanged[v] = {std::move(whole), bytes};
+  });
+  for (std::size_t v = 0; v < vectors.size(); ++v) {
+    if (unchanged[v].grid.empty()) continue;
+    CarriedGrid& carried = unchanged[v].grid.front();
+    const std::size_t place = gridOf(vectors[v]).place;
+    made.carriedVectors.push_back({place, unchanged[v].bytesOfComponents});
+    const auto at = std::ranges::lower_bound(source.carried, place, {}, &CarriedGrid::place);
+    carried.place = std::uint32_t(place);
+    source.carried.insert(at, std::move(carried));
   }
   std::erase_if(made.grids, [&](const GridConversion& grid) {
     return std::ranges::count(made.carriedVectors, source.grids[grid.source].place,
@@ -749,7 +786,7 @@ ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
   made.interrupted = converter.isCancelled();
   {
     const Completion completion;
-    if (!made.interrupted) carrySmallerVectors(options, source, made);
+    if (!made.interrupted) carrySmallerVectors(options, converter, source, made);
     forgetMissingTwins(made.grids);
     assemble(source, made);
   }

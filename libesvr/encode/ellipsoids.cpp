@@ -432,6 +432,11 @@ double EllipsoidSearch::completed(const Attempt& attempt, CompactResult& rounded
 
 // ---- Short fits
 
+std::optional<double> EllipsoidSearch::scoutedBytes() const {
+  if (!job_.scout || !std::isfinite(job_.scout->psnr)) return std::nullopt;
+  return kUsualBytesEach * countFor({*job_.scout}, *goal_.psnr, slope_);
+}
+
 /// Quality of a whole fit less that of a short one, dB.
 double EllipsoidSearch::behind() const {
   if (before_) return 0.0;

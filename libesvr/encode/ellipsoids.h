@@ -92,6 +92,8 @@ class EllipsoidSearch {
   /// The PSNR (for a size) or the bytes (for a PSNR) to expect of the whole fits.
   [[nodiscard]] double expectedPsnr() const;
   [[nodiscard]] std::uint64_t expectedBytes() const { return expectedBytes_; }
+  /// About the bytes for a PSNR by what Job::scout shows, before the short fits; nothing if there is no scout.
+  [[nodiscard]] std::optional<double> scoutedBytes() const;
 
   /// False if the drafts show that the grid cannot stay below a number of bytes, or, for a size, that
   /// it cannot have a PSNR, even if it is better than expected by kUncertainty.

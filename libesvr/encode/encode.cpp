@@ -189,7 +189,9 @@ class Choice {
         });
       });
     };
-    const auto estimate = [&] { return unlessCancelled([&] { return voxels_->estimate(); }); };
+    const auto estimate = [&] {
+      return unlessCancelled([&] { return voxels_->estimate(ellipsoids_->scoutedBytes()); });
+    };
     if (!onGpu) {
       expected = estimate();
       if (!expected || expected->bytes < smallEnough) return expected;

@@ -287,8 +287,7 @@ class Sharing {
     if (isAlone && file_.grids[g].voxels->codes.size() > kMostAlone) return;
     Shared shared{.bytesWithout = bytesAdded(file_, g)};
     shared.seconds = secondsOf([&] {
-      file_.grids[g].reference = reference;
-      shared.bytesWith = bytesAdded(file_, g);
+      shared.bytesWith = bytesWith(g, reference);
       if (shared.bytesWith >= shared.bytesWithout) file_.grids[g].reference.reset();
       // Each grid of a frame is encoded with the better context.
       if (!options_.previous.file && mayChooseAgain(g, shared)) chooseAgain(g, reference, shared);
@@ -300,6 +299,15 @@ class Sharing {
       grids_[g].shared = shared;
     }
     copyToTwins(g);
+  }
+
+  /// Gives a grid a reference. \return the bytes that it takes with it
+  [[nodiscard]] std::uint64_t bytesWith(std::size_t g, const VoxelReference& reference) {
+    StoredGrid& grid = file_.grids[g];
+    grid.reference = reference;
+    format::keepRelated(*grid.voxels, reference,
+                        reference.grid ? &*file_.grids[*reference.grid].voxels : nullptr);
+    return bytesAdded(file_, g);
   }
 
   /// True if the voxels of a grid may be others of the same quality.
@@ -320,8 +328,7 @@ class Sharing {
                              .conversion.grid;
       if (!again.voxels) return;
       const StoredGrid before = std::exchange(file_.grids[g], std::move(again));
-      file_.grids[g].reference = reference;
-      const std::uint64_t bytes = bytesAdded(file_, g);
+      const std::uint64_t bytes = bytesWith(g, reference);
       if (bytes >= std::min(shared.bytesWith, shared.bytesWithout)) {
         file_.grids[g] = before;
         return;

@@ -39,8 +39,10 @@ class VoxelSearch {
 
   /// The figures to expect of run(), from the sample. If the sample is the whole volume, they are those
   /// of the result, and Candidate::estimated is false.
+  /// \param rival  bytes with which ellipsoids may reach the PSNR; where the voxels take many more, the result is the least
+  ///               that they can take, and run() would search on. Nothing: it is not known
   /// \return nothing if no voxels can be that small
-  [[nodiscard]] std::optional<Candidate> estimate();
+  [[nodiscard]] std::optional<Candidate> estimate(std::optional<double> rival = {});
 
   /// For a size: the coarsest voxels with a PSNR if they are clearly too large, which takes less time to find out than
   /// estimate(); nothing if they may fit.
@@ -119,6 +121,9 @@ class VoxelSearch {
   std::uint64_t besides_ = 0;  ///< bytes of a grid without its voxels
   Plateau plateau_;
   bool hasTried_ = false;
+  std::optional<double> rival_;  ///< of estimate()
+  bool isFarBehind_ =
+      false;  ///< the search ended because the voxels take many more bytes than the rival
   std::optional<Tried> best_;           ///< the best setting on the sample
   std::optional<std::uint64_t> exact_;  ///< bytes of exact voxels, if they may be the better ones
   double seconds_ = 0.0;

@@ -10,6 +10,7 @@
 
 #include "codec/brick_coder.h"
 #include "core/atomic_file.h"
+#include "core/parallel.h"
 #include "esvr/container.h"
 #include "esvr/grid.h"
 #include "format/ellipsoid_sections.h"
@@ -196,7 +197,8 @@ void addChunks(SectionWriter& out, std::uint32_t g, const SortedGrid& grid) {
       addChunk(out, g, c, grid.chunks[c].ellipsoids);
 }
 
-void addRelated(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> grids) {
+/// The voxels of a grid that refers to another one, coded.
+std::vector<std::byte> relatedOf(std::uint32_t g, std::span<const StoredGrid> grids) {
   const StoredGrid& grid = grids[g];
   const VoxelReference& reference = *grid.reference;
   const bool isThere = !reference.grid || (*reference.grid < g && grids[*reference.grid].voxels);
@@ -204,18 +206,19 @@ void addRelated(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid>
   auto content = putRelated(*grid.voxels, reference,
                             reference.grid ? &*grids[*reference.grid].voxels : nullptr);
   if (!content) refuse(grid, "its voxels cannot be coded with those of the grid it refers to");
-  out.addRaw({SectionKind::kRelated, g}, kRequired, std::move(*content));
+  return std::move(*content);
 }
 
-void addExtras(SectionWriter& out, std::uint32_t g, std::span<const StoredGrid> grids) {
-  const StoredGrid& grid = grids[g];
+/// \param related  relatedOf() the grid, if it refers to another one
+void addExtras(SectionWriter& out, std::uint32_t g, const StoredGrid& grid,
+               std::vector<std::byte> related) {
   if (grid.topology == TopologyKind::kMask)
     out.addRaw({SectionKind::kMask, g}, kRequired, putMask(grid.bricks, grid.mask));
   else if (!grid.bricks.empty())
     out.add({SectionKind::kBricks, g}, kRequired, putBricks(grid.bricks));
   if (grid.residual) out.addVoxels({SectionKind::kResidual, g}, *grid.residual);
   if (grid.reference)
-    addRelated(out, g, grids);
+    out.addRaw({SectionKind::kRelated, g}, kRequired, std::move(related));
   else if (grid.voxels)
     out.addVoxels({SectionKind::kVoxels, g}, *grid.voxels);
   if (!grid.layerErrors.empty())
@@ -333,11 +336,16 @@ SectionWriter collect(const EsvrFile& file, const FrameContext& context) {
   if (!inherited.vectors) addVectors(out, file.vectors);
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
+  std::vector<std::vector<std::byte>> related(
+      grids.size());  // each on one thread, which takes long
+  parallelFor(std::uint32_t{0}, std::uint32_t(grids.size()), [&](std::uint32_t g) {
+    if (!differences[g] && file.grids[g].reference) related[g] = relatedOf(g, file.grids);
+  });
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     addNonFinite(out, g, file.grids[g], gridBefore(previous, g));
     if (differences[g]) continue;
     addChunks(out, g, grids[g]);
-    addExtras(out, g, file.grids);
+    addExtras(out, g, file.grids[g], std::move(related[g]));
   }
   if (!inherited.carried) addCarriedBytes(out, file.carried, grids.size());
   return out;
@@ -374,7 +382,8 @@ std::uint64_t bytesOfOwn(const EsvrFile& frame, std::size_t g) {
   constexpr std::uint64_t kJoinedRecordBytes = 64;
   if (!frame.grids[g].reference) return bytesAdded(frame, g) - bytesOfNonFinite(frame.grids[g]);
   SectionWriter out;
-  addRelated(out, std::uint32_t(g), frame.grids);
+  out.addRaw({SectionKind::kRelated, std::uint32_t(g)}, kRequired,
+             relatedOf(std::uint32_t(g), frame.grids));
   return out.bytesUnshared() - kEntryBytes + kFrameRowBytes + kJoinedRecordBytes;
 }
 
@@ -439,7 +448,8 @@ std::uint64_t bytesAdded(const EsvrFile& file, std::size_t grid) {
   addGrid(out, g, own);
   addChunkTable(out, g, own);
   addChunks(out, g, own);
-  addExtras(out, g, file.grids);
+  addExtras(out, g, own.grid,
+            own.grid.reference ? relatedOf(g, file.grids) : std::vector<std::byte>{});
   addNonFinite(out, g, file.grids[grid], nullptr);
   return out.bytesUnshared();
 }

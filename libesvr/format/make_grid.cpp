@@ -4,7 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <string>
 #include <utility>
@@ -70,8 +72,9 @@ std::string whyImprecise(const StoredGrid& grid) {
 namespace {
 
 // A bin holds the activities with the same exponent and the same first 7 bits of the mantissa, so
-// that the resolution relative to the value is the same from 1e-38 to 1e38.
+// that the resolution relative to the value is the same from 1e-38 to 1e38. An octave is the bins of an exponent.
 constexpr int kDroppedBits = 16;
+constexpr std::size_t kBinsOfOctave = 128;
 
 /// Squared error that a better overlap may add, as a share of the error that is there if every
 /// voxel is active: 0.004 dB.
@@ -89,6 +92,10 @@ float thresholdBelow(std::size_t bin) {
 struct Tally {
   std::uint64_t active = 0, inactive = 0;  ///< voxels, by the source's mask
   double cost = 0.0;                       ///< squared error that making these voxels inactive adds
+
+  friend Tally operator+(const Tally& a, const Tally& b) {
+    return {a.active + b.active, a.inactive + b.inactive, a.cost + b.cost};
+  }
 };
 
 struct ThresholdChoice {
@@ -96,6 +103,7 @@ struct ThresholdChoice {
   double iou = 0.0;  ///< intersection over union of the active voxels of source and result
 };
 
+/// Octaves without a voxel take no memory, so that every task can have a histogram.
 class Histogram {
  public:
   void add(const VoxelRule& rule, float value, float wanted, bool active) {
@@ -104,7 +112,8 @@ class Histogram {
     error_ += kept * kept;
     const float activity = rule.activity(settled);
     if (!(activity > 0.0f)) return;
-    Tally& bin = bins_[binOf(activity)];
+    const std::size_t k = binOf(activity);
+    Tally& bin = octaveOf(k)[k % kBinsOfOctave];
     ++(active ? bin.active : bin.inactive);
     const double dropped = double(wanted) - rule.inactiveValue(settled);
     bin.cost += dropped * dropped - kept * kept;
@@ -112,10 +121,11 @@ class Histogram {
 
   void add(const Histogram& other) {
     error_ += other.error_;
-    for (std::size_t k = 0; k < bins_.size(); ++k) {
-      bins_[k].active += other.bins_[k].active;
-      bins_[k].inactive += other.bins_[k].inactive;
-      bins_[k].cost += other.bins_[k].cost;
+    for (std::size_t k = 0; k < kBins; k += kBinsOfOctave) {
+      const Octave& octave = other.octaves_[k / kBinsOfOctave];
+      if (octave.empty()) continue;
+      Octave& own = octaveOf(k);
+      std::ranges::transform(own, octave, own.begin(), std::plus<>());
     }
   }
 
@@ -124,7 +134,7 @@ class Histogram {
     const double allowed = kAllowedShare * error_;
     double cost = 0.0, bestIou = 0.0;
     std::size_t first = 0, last = 0;
-    for (std::size_t k = 0; k < bins_.size(); ++k) {
+    for (std::size_t k = 0; k < kBins; ++k) {
       const double iou = double(kept.active) / double(sourceActive + kept.inactive);
       if (cost <= allowed && iou > bestIou) {
         bestIou = iou;
@@ -132,25 +142,37 @@ class Histogram {
       } else if (cost <= allowed && iou == bestIou && last + 1 == k) {
         last = k;
       }
-      kept.active -= bins_[k].active;
-      kept.inactive -= bins_[k].inactive;
-      cost += bins_[k].cost;
+      const Tally dropped = bin(k);
+      kept.active -= dropped.active;
+      kept.inactive -= dropped.inactive;
+      cost += dropped.cost;
     }
     return {thresholdBelow((first + last) / 2), bestIou};
   }
 
  private:
+  using Octave = std::vector<Tally>;
+
+  [[nodiscard]] Octave& octaveOf(std::size_t bin) {
+    Octave& octave = octaves_[bin / kBinsOfOctave];
+    if (octave.empty()) octave.resize(kBinsOfOctave);
+    return octave;
+  }
+
+  [[nodiscard]] Tally bin(std::size_t k) const {
+    const Octave& octave = octaves_[k / kBinsOfOctave];
+    return octave.empty() ? Tally{} : octave[k % kBinsOfOctave];
+  }
+
   [[nodiscard]] Tally total() const {
     Tally sum;
-    for (const Tally& bin : bins_) {
-      sum.active += bin.active;
-      sum.inactive += bin.inactive;
-    }
+    for (const Octave& octave : octaves_) sum = std::accumulate(octave.begin(), octave.end(), sum);
     return sum;
   }
 
   double error_ = 0.0;  ///< the squared error if every voxel is active
-  std::vector<Tally> bins_ = std::vector<Tally>(kBins);
+  std::vector<Octave> octaves_ =
+      std::vector<Octave>(kBins / kBinsOfOctave + 1);  ///< empty: no voxel
 };
 
 void addBrick(const SparseVolume& source, const VoxelRule& rule, const Box& box, Coord corner,
@@ -164,8 +186,8 @@ void addBrick(const SparseVolume& source, const VoxelRule& rule, const Box& box,
   }
 }
 
-/// Bricks of a batch that are counted by one thread. A histogram takes 0.8 MB.
-constexpr std::size_t kBricksOfPart = 1024;
+/// Bricks of a batch that are counted by one task. A histogram takes 3 KB for each octave of the values.
+constexpr std::size_t kBricksOfPart = 64;
 
 /// Chooses the threshold with the best overlap of the active voxels among those that add no more
 /// than 0.004 dB to the error. It is precise to 1/128 of its value. The search takes one evaluation

@@ -553,17 +553,43 @@ const VoxelLayer* referencedLayer(const VoxelReference& reference,
 
 }  // namespace
 
+namespace {
+
+/// The checksum of all that a section of related voxels depends on.
+std::uint64_t checksumOfRelated(const VoxelLayer& layer, const VoxelReference& reference,
+                                const VoxelLayer& context) {
+  ByteWriter all;
+  putReference(all, reference);
+  all.put(checksumOf(layer));
+  all.put(checksumOf(context));
+  RunningChecksum sum;
+  sum.add(all.take());
+  return sum.value();
+}
+
+}  // namespace
+
 std::optional<std::vector<std::byte>> putRelated(const VoxelLayer& layer,
                                                  const VoxelReference& reference,
                                                  const VoxelLayer* of) {
   const VoxelLayer empty = emptyAt(layer);
   const VoxelLayer& context = of ? *of : empty;
+  const CodedVoxels& kept = layer.related;
+  if (kept.section && kept.checksum == checksumOfRelated(layer, reference, context))
+    return *kept.section;
   if (!codec::isPredictable(layer, context)) return std::nullopt;
   ByteWriter out;
   putReference(out, reference);
   putRelatedHead(out, layer, of);
   out.putAll(encodePredicted(layer, codec::PastVoxels(context, layer, mapOf(reference))));
   return out.take();
+}
+
+void keepRelated(VoxelLayer& layer, const VoxelReference& reference, const VoxelLayer* of) {
+  auto content = putRelated(layer, reference, of);
+  if (!content) return;
+  layer.related = {checksumOfRelated(layer, reference, of ? *of : emptyAt(layer)),
+                   std::make_shared<const std::vector<std::byte>>(std::move(*content))};
 }
 
 std::optional<std::size_t> referenceIn(std::span<const std::byte> begin, const std::string& where) {

@@ -78,13 +78,15 @@ void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& bu
 /// Largest number of bytes at the beginning of a section that say which grid it refers to.
 inline constexpr std::uint64_t kReferenceBytes = 5;
 
-/// Encodes voxels.
+/// Encodes voxels, unless the layer has kept this section.
 /// \param reference  what is written of it; the layer that it names is `of`
 /// \param of  null: the context is empty
 /// \return nothing if the layer cannot be coded with this context
 [[nodiscard]] std::optional<std::vector<std::byte>> putRelated(const VoxelLayer& layer,
                                                                const VoxelReference& reference,
                                                                const VoxelLayer* of);
+/// Encodes voxels and keeps the section in their layer, if it can be coded. putRelated() with the same arguments returns it.
+void keepRelated(VoxelLayer& layer, const VoxelReference& reference, const VoxelLayer* of);
 
 /// The grid that a section refers to, from its first bytes. \throws BadInput
 [[nodiscard]] std::optional<std::size_t> referenceIn(std::span<const std::byte> begin,

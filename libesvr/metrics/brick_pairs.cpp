@@ -139,20 +139,29 @@ struct Prefix {
   }
 };
 
-/// How many errors of the union of active voxels begin with the prefix, by their next digit.
+using Range = tbb::blocked_range<std::size_t>;
+
+/// Calls a function with the bits of each error of the union of active voxels that begin with the prefix.
+template <class Use>
+void forEachKey(std::span<const BrickPair> pairs, const Range& range, const Prefix& prefix,
+                const Use& use) {
+  for (std::size_t i = range.begin(); i != range.end(); ++i)
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      if (!pairs[i].isAnyActive(v)) continue;
+      const auto key = std::bit_cast<std::uint64_t>(std::abs(pairs[i].errorAt(v)));
+      if (prefix.matches(key)) use(key);
+    }
+}
+
+/// How many errors begin with the prefix, by their next digit.
 std::vector<std::uint64_t> countDigits(std::span<const BrickPair> pairs, const Prefix& prefix) {
-  using Range = tbb::blocked_range<std::size_t>;
   using Histogram = std::vector<std::uint64_t>;
   constexpr std::size_t kPairsPerTask = 512;  // large, since a task's counters take 512 KB
   return parallelReduce(
       Range(0, pairs.size(), kPairsPerTask), Histogram(kDigits),
       [&](const Range& range, Histogram counts) {
-        for (std::size_t i = range.begin(); i != range.end(); ++i)
-          for (int v = 0; v < kBrickVoxels; ++v) {
-            if (!pairs[i].isAnyActive(v)) continue;
-            const auto key = std::bit_cast<std::uint64_t>(std::abs(pairs[i].errorAt(v)));
-            if (prefix.matches(key)) ++counts[prefix.nextDigit(key)];
-          }
+        forEachKey(pairs, range, prefix,
+                   [&](std::uint64_t key) { ++counts[prefix.nextDigit(key)]; });
         return counts;
       },
       [](Histogram a, const Histogram& b) {
@@ -161,15 +170,35 @@ std::vector<std::uint64_t> countDigits(std::span<const BrickPair> pairs, const P
       });
 }
 
+/// All errors that begin with the prefix, in any order.
+std::vector<std::uint64_t> keysWith(std::span<const BrickPair> pairs, const Prefix& prefix) {
+  return parallelReduce(
+      Range(0, pairs.size()), std::vector<std::uint64_t>(),
+      [&](const Range& range, std::vector<std::uint64_t> keys) {
+        forEachKey(pairs, range, prefix, [&](std::uint64_t key) { keys.push_back(key); });
+        return keys;
+      },
+      [](std::vector<std::uint64_t> a, const std::vector<std::uint64_t>& b) {
+        a.insert(a.end(), b.begin(), b.end());
+        return a;
+      });
+}
+
 }  // namespace
 
 double errorOfRank(std::span<const BrickPair> pairs, std::uint64_t rank) {
+  constexpr std::uint64_t kFew = std::uint64_t{1} << 18;  // keys that are sorted at once
   Prefix prefix;
   while (prefix.unknown > 0) {
     const std::vector<std::uint64_t> counts = countDigits(pairs, prefix);
     std::size_t digit = 0;
     while (counts[digit] < rank) rank -= counts[digit++];
     prefix.append(digit);
+    if (counts[digit] > kFew) continue;
+    std::vector<std::uint64_t> keys = keysWith(pairs, prefix);
+    const auto at = keys.begin() + std::ptrdiff_t(rank - 1);
+    std::ranges::nth_element(keys, at);
+    return std::bit_cast<double>(*at);
   }
   return std::bit_cast<double>(prefix.bits);
 }

@@ -43,6 +43,20 @@ TEST_F(VoxelSearch, SlowReachesAPsnrAndLittleMore) {
   }
 }
 
+TEST_F(VoxelSearch, EndsWhereARivalTakesFarFewerBytes) {
+  const auto wanted = forPsnr(40.0);
+  const double bytes = double(wanted.bytes);
+  encode::VoxelSearch far(job_, {.psnr = 40.0});
+  const auto least = far.estimate(0.2 * bytes);
+  ASSERT_TRUE(least);
+  EXPECT_TRUE(least->estimated);
+  EXPECT_GT(double(least->bytes), 0.6 * bytes);
+  EXPECT_LE(double(least->bytes), bytes);
+  EXPECT_EQ(far.run()->grid.voxels, wanted.grid.voxels) << "it searches on when it has to";
+  encode::VoxelSearch near(job_, {.psnr = 40.0});
+  EXPECT_FALSE(near.estimate(0.5 * bytes)->estimated) << "a rival that is not far ahead";
+}
+
 TEST_F(VoxelSearch, FillsASize) {
   for (const std::uint64_t bytes : {4000u, 20000u}) {
     const auto found = ofBytes(bytes);

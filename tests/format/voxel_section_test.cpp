@@ -77,6 +77,30 @@ TEST(VoxelSection, ThatIsKeptCountsWhileTheLayerIsTheSame) {
   }
 }
 
+TEST(VoxelSection, WithAReferenceIsKeptWhileBothLayersAreTheSame) {
+  const std::vector<VoxelLayer> layers = someLayers();
+  VoxelLayer of = layers[3], kept = of;
+  for (std::int32_t& code : of.codes) code /= 2;
+  const VoxelReference reference{std::size_t{0}, 2.0f, 0.0f}, other{std::size_t{0}, 1.5f, 0.0f};
+  format::keepRelated(kept, reference, &of);
+  ASSERT_TRUE(kept.related.section);
+  const auto expectAsNew = [&](const VoxelReference& with, const VoxelLayer* context,
+                               const char* what) {
+    VoxelLayer anew = kept;
+    anew.related = {};
+    EXPECT_EQ(format::putRelated(kept, with, context), format::putRelated(anew, with, context))
+        << what;
+  };
+  EXPECT_EQ(*format::putRelated(kept, reference, &of), *kept.related.section);
+  expectAsNew(reference, &of, "the same");
+  expectAsNew(other, &of, "another gain");
+  expectAsNew({}, nullptr, "no reference");
+  of.codes[7] += 1;
+  expectAsNew(reference, &of, "a code of the reference");
+  of.codes[7] -= 1, kept.divisor *= 2.0;
+  expectAsNew(reference, &of, "the divisor");
+}
+
 TEST(VoxelSection, OfNoBrickComesBack) {
   EXPECT_EQ(voxelsOf(putVoxels(VoxelLayer{}), "v"), VoxelLayer{});
 }

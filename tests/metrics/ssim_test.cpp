@@ -154,6 +154,24 @@ TEST(ErrorOfRank, isTheSortedErrorOfThatRank) {
     ASSERT_EQ(errorOfRank(pairs, rank), errors[rank - 1]) << "rank " << rank;
 }
 
+TEST(ErrorOfRank, findsOneOfManyThatBeginWithTheSameBits) {
+  SparseVolume reference = test::volumeOf({{{0, 0, 0}, 1.0f}});
+  constexpr std::size_t kBricks = 700;  // of 512 voxels: more than are sorted at once
+  reference.bricks.clear();
+  for (std::size_t b = 0; b < kBricks; ++b) reference.bricks.push_back({0, 0, int(b)});
+  reference.values.resize(kBricks * kBrickVoxels);
+  reference.active.assign(kBricks, BrickMask{});
+  for (BrickMask& mask : reference.active)
+    for (int v = 0; v < kBrickVoxels; ++v) mask.set(v);
+  for (std::size_t i = 0; i < reference.values.size(); ++i)
+    reference.values[i] = 1.0f + 0x1p-23f * float(i * 7919 % reference.values.size());
+  const SparseVolume none;
+  const auto pairs = pairBricks(reference, none);
+  for (const std::size_t rank :
+       {std::size_t{1}, reference.values.size() / 3, reference.values.size()})
+    EXPECT_EQ(errorOfRank(pairs, rank), 1.0 + 0x1p-23 * double(rank - 1)) << rank;
+}
+
 TEST(ErrorOfRank, countsEachVoxelOfTheUnionOnce) {
   const auto a = test::volumeOf({{{0, 0, 0}, 1.0f}, {{1, 0, 0}, 2.0f}});
   const auto b = test::volumeOf({{{1, 0, 0}, 5.0f}, {{9, 0, 0}, 7.0f}});

@@ -145,6 +145,8 @@ struct VoxelLayer {
   std::vector<BrickMask> active;
   std::vector<BrickMask> vacant;  ///< inactive voxels that are exactly the background
   CodedVoxels coded;
+  CodedVoxels
+      related;  ///< with another grid as context (VoxelReference), which the checksum includes
 
   friend bool operator==(const VoxelLayer&, const VoxelLayer&) = default;
 };
