@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "compare/compare_files.h"
 #include "compare/figures.h"
 #include "compare/grid_file.h"
 #include "compare/options.h"

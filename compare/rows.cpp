@@ -498,16 +498,4 @@ TableRow RowMaker::fitted(const FitWish& wish) {
   return row;
 }
 
-void addRow(const TableScene& scene, const cli::Log& log, TableRow row, TableRecord& record) {
-  if (scene.cancel.cancelled()) throw Cancelled();
-  log.detail("made " + row.group + ": " + row.name);
-  record.rows.push_back(std::move(row));
-}
-
-void requireAllRows(const TableRecord& record) {
-  if (record.interrupted)
-    throw RuntimeFailure("interrupted; " + cli::counted(record.rows.size(), "row") +
-                         " made, the others are missing");
-}
-
 }  // namespace esvr::compare

@@ -1,5 +1,5 @@
 #pragma once
-/// The rows of a table or of curves: the reference, the baselines that are compared with it, and
+/// The rows of a table: the reference, the baselines that are compared with it, and
 /// the measurement of one row after the other from the same voxels.
 
 #include <filesystem>
@@ -138,11 +138,5 @@ class RowMaker {
   const TableScene& scene_;
   BaselineEncoder encoder_;
 };
-
-/// Adds a row that was made. \throws Cancelled  the run was interrupted meanwhile
-void addRow(const TableScene& scene, const cli::Log& log, TableRow row, TableRecord& record);
-
-/// \throws RuntimeFailure  the run was interrupted; the text has the number of rows
-void requireAllRows(const TableRecord& record);
 
 }  // namespace esvr::compare

@@ -23,6 +23,11 @@ using cli::po::value;
 
 // Options.
 
+namespace {
+
+using Words = std::vector<std::string>;
+
+/// The options and arguments for the reference and the candidates.
 void addSceneOptions(cli::CommandLine& line) {
   line.argument("reference", "REF.vdb");
   line.repeatedArgument("candidates");
@@ -54,10 +59,6 @@ void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
   options.threads = a.threads;
   options.verbosity = a.verbosity;
 }
-
-namespace {
-
-using Words = std::vector<std::string>;
 
 constexpr int kMaxRuns = 1000;
 constexpr double kMaxPsnr = 200.0;  // dB, more than rounding to floats leaves
@@ -287,7 +288,11 @@ class TableRun {
   }
 
  private:
-  void add(TableRow row) { addRow(scene_, log_, std::move(row), record_); }
+  void add(TableRow row) {
+    if (scene_.cancel.cancelled()) throw Cancelled();
+    log_.detail("made " + row.group + ": " + row.name);
+    record_.rows.push_back(std::move(row));
+  }
 
   void addBaseline(const std::string& group, const BaselineSetting& setting) {
     add(maker_.baseline(group, setting, displayName(setting)));
@@ -356,7 +361,9 @@ void table(const TableOptions& options) {
   writeReports(options, record);
   if (options.files.json != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)
     printTable(record, options.verbosity == cli::Verbosity::kVerbose, std::cout);
-  requireAllRows(record);
+  if (record.interrupted)
+    throw RuntimeFailure("interrupted; " + cli::counted(record.rows.size(), "row") +
+                         " made, the others are missing");
 }
 
 }  // namespace esvr::compare

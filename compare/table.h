@@ -1,5 +1,5 @@
 #pragma once
-/// esvr-compare table, the paper's tables for any volume, and esvr-compare curves.
+/// esvr-compare table, the paper's tables for any volume.
 
 #include <cstdint>
 #include <filesystem>
@@ -57,28 +57,5 @@ struct TableOptions {
 /// \throws BadInput  the files cannot be compared
 /// \throws RuntimeFailure  the run was interrupted; finished rows were printed and written
 void table(const TableOptions& options);
-
-/// The options and arguments for the reference and the candidates, which `curves` has, too.
-void addSceneOptions(cli::CommandLine& line);
-/// \throws UsageError  a value is out of range
-void readSceneOptions(const cli::Arguments& arguments, TableOptions& options);
-
-// esvr-compare curves: error over run time, error over bytes, pictures per second over bytes (curves.cpp).
-
-struct CurvesOptions {
-  TableOptions table;  ///< the files, sizes and baselines
-  std::string prefix;  ///< prefix of the names of the written files
-  bool overwrite = false;
-};
-
-/// \param argv  arguments, beginning with the command ("curves")
-/// \return nothing if --help or --version was printed
-/// \throws UsageError  an option is invalid
-[[nodiscard]] std::optional<CurvesOptions> parseCurvesOptions(int argc, const char* const* argv);
-
-/// Measures the points and writes all files.
-/// \throws BadInput  the files cannot be compared
-/// \throws RuntimeFailure  the run was interrupted; finished points were written
-void curves(const CurvesOptions& options);
 
 }  // namespace esvr::compare

@@ -29,7 +29,7 @@ inline ProgramRun quickFit(const std::string& input, const std::string& output,
       more));
 }
 
-/// Runs a command of the program: "check", "table" or "curves".
+/// Runs a command of the program: "check" or "table".
 inline ProgramRun compare(const std::string& command, const Words& arguments) {
   return runProgram(ESVR_COMPARE, joined({command}, arguments));
 }

@@ -330,12 +330,5 @@ TEST_F(ComparisonDoc, namesTheKeysOfATable) {
     expectNamed(all_["rows"][object], row.at(object), object);
 }
 
-TEST_F(ComparisonDoc, namesTheKeysOfCurves) {
-  succeeded(compare("curves", {at("in.vdb"), at("in.esvr"), "--output", at("c"), "--fit", "1KB",
-                               "--fps", "16", "--device", "cpu"}));
-  merge(all_, Json::parse(readText(at("c.json"))));
-  expectTable(all_, tableAfter(document_, "The report of `curves`"), {}, "curves");
-}
-
 }  // namespace
 }  // namespace esvr::test
