@@ -12,7 +12,7 @@
 #include "programs/option_values.h"
 #include "programs/run_main.h"
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/report.h"
+#include "vdb2esvr/records.h"
 
 namespace esvr::vdb2esvr {
 
