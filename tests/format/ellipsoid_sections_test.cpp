@@ -15,7 +15,6 @@
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "format/allocation_meter.h"
 #include "format/bytes.h"
 #include "format/sample_files.h"
 #include "support/files.h"
