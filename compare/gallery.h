@@ -3,7 +3,6 @@
 /// views.
 
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,23 +24,9 @@ struct GalleryOptions {
   Resolution resolution{400, 400};
   double step = 1.0;
   std::vector<NamedTransfer> transfers;
-  std::string lpips;  ///< command for PictureMetric; empty: none
-};
-
-/// A metric of two pictures that a program of the user computes, for example LPIPS.
-class PictureMetric {
- public:
-  /// \param command  shell command that gets the files of the reference and the picture as
-  ///                 arguments; the last word of its output is the figure
-  /// \param folder   folder for the two files, which are 8-bit PNG in front of black
-  PictureMetric(std::string command, std::filesystem::path folder);
-
-  /// \throws RuntimeFailure  the command fails, or its last word is not a number
-  [[nodiscard]] double of(const Image& reference, const Image& picture) const;
-
- private:
-  std::string command_;
-  std::filesystem::path folder_;
+  /// Shell command that gets the files of the reference and a picture as arguments (8-bit PNG in front
+  /// of black), and whose last word is a figure of both, for example LPIPS; empty: none
+  std::string lpips;
 };
 
 /// The views of a table: draws the reference once, and compares the pictures of each row with it.
@@ -57,7 +42,8 @@ class Gallery {
     ImageFigures figures;
     Shown shown;
   };
-  /// The exceptions are those of Renderer::draw and PictureMetric.
+  /// \throws RuntimeFailure  the command of GalleryOptions fails, or its last word is not a number; else
+  ///                         as for Renderer::draw
   [[nodiscard]] Compared compare(Renderer& renderer) const;
   [[nodiscard]] const std::string& referencePng() const { return referencePng_; }
   /// The cost of drawing the reference; only fps and deviceBytes are set.
@@ -67,7 +53,8 @@ class Gallery {
  private:
   std::vector<RenderOptions> views_;
   Device device_;
-  std::optional<PictureMetric> lpips_;
+  std::string lpips_;
+  std::filesystem::path folder_;
   std::vector<Image> references_;
   std::string referencePng_;
   ImageFigures referenceCost_;

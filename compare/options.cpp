@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "esvr/baseline.h"
-#include "programs/command_line.h"
 #include "programs/files.h"
 #include "programs/option_values.h"
 

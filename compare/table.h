@@ -10,7 +10,9 @@
 #include "compare/external.h"
 #include "compare/gallery.h"
 #include "compare/options.h"
+#include "compare/table_record.h"
 #include "esvr/baseline.h"
+#include "esvr/device.h"
 #include "esvr/volume.h"
 #include "programs/resources.h"
 #include "programs/run_main.h"
@@ -52,6 +54,11 @@ struct TableOptions {
 /// \return nothing if --help or --version was printed
 /// \throws UsageError  an option is invalid
 [[nodiscard]] std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv);
+
+/// Reads the reference and makes all rows (rows.cpp). If the run is interrupted, finished rows are kept.
+/// \throws BadInput  the reference has no active voxel, or cannot be compared; as for readGrid
+[[nodiscard]] TableRecord makeRows(const TableOptions& options, const CancelToken& cancel,
+                                   const cli::Log& log);
 
 /// Makes the rows, prints them and writes the reports.
 /// \throws BadInput  the files cannot be compared

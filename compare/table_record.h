@@ -136,7 +136,7 @@ class PageOrder {
 
 struct TableOptions;
 
-// The rows as text, Markdown, CSV, JSON and HTML (report_parts.cpp).
+// The rows as text, Markdown, CSV, JSON and HTML (table_report.cpp).
 
 /// Prints the table with at most 100 characters in a line, unless a name is longer.
 /// \param search  whether the trials of the searches are printed
