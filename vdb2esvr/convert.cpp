@@ -1,15 +1,11 @@
 // Chooses grids of the input, reads them, and measures their conversions.
 #include "vdb2esvr/convert.h"
-#include "esvr/convert_file.h"
 
 #include <algorithm>
 #include <set>
 #include <utility>
-#include <variant>
 
-#include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/metrics.h"
 #include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {

@@ -2,11 +2,9 @@
 /// Chooses the grids of a file that are fitted, carried unchanged and left out, reads them, measures their conversions, and
 /// says what to do with those that cannot be converted.
 
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "esvr/convert_file.h"
 #include "esvr/error.h"

@@ -1,7 +1,6 @@
 // The option --paper, which replaces our method by the paper's, and its part of the report.
 
 #include <functional>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>

@@ -2,7 +2,6 @@
 /// The records of a run and of a sequence, and their summaries and reports.
 
 #include <cstdint>
-#include <filesystem>
 #include <iosfwd>
 #include <nlohmann/json.hpp>
 #include <optional>

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <span>
-#include <string>
 #include <utility>
 
 #include "core/parallel.h"

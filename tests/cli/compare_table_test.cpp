@@ -12,7 +12,6 @@
 #include <cmath>
 #include <fstream>
 #include <iomanip>
-#include <set>
 
 #include "cli/conversion.h"
 #include "compare/table_record.h"

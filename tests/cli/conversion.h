@@ -12,7 +12,6 @@
 #include "cli/run_program.h"
 #include "cli/vdb_inputs.h"
 #include "esvr/container.h"
-#include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 

@@ -4,7 +4,6 @@
 
 #include <map>
 #include <regex>
-#include <set>
 
 #include "cli/run_program.h"
 

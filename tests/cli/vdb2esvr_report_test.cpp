@@ -2,8 +2,6 @@
 // from it, and the options. docs/report.md names exactly the keys that the reports of several runs,
 // which together have every key, have.
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <regex>

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "vdb/foreign_grids.h"
 #include "vdb/open_vdb.h"
 
 namespace esvr::test {

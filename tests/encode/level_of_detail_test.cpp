@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "../field/random_field.h"
-#include "esvr/grid_coding.h"
 
 namespace esvr {
 namespace {

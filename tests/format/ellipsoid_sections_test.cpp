@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <string>
 
 #include "esvr/container.h"
 #include "esvr/encode.h"

@@ -1,7 +1,5 @@
 #include "support/stability.h"
 
-#include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <limits>
 
