@@ -1,4 +1,5 @@
-#include "compare/gallery.h"
+// The option --images: compares pictures of every row with pictures of the reference from the same views.
+#include "compare/table.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +7,6 @@
 #include <sstream>
 #include <utility>
 
-#include "compare/external.h"
 #include "esvr/error.h"
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "compare/external.h"
-#include "compare/gallery.h"
 #include "compare/grid_file.h"
 #include "compare/options.h"
 #include "compare/table.h"
