@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
+#include "vdb/foreign_grids.h"
 
 namespace esvr::test {
 
