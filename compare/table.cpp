@@ -12,6 +12,7 @@
 
 namespace esvr::compare {
 
+using cli::po::bool_switch;
 using cli::po::value;
 
 // Options.
@@ -37,6 +38,38 @@ void addSceneOptions(cli::CommandLine& line) {
   // clang-format on
   cli::addDevice(line.options(), "device for fits and pictures: ");
   cli::addHostMemory(line);
+}
+
+/// Adds --report and the other forms of a report.
+void addReportOptions(cli::po::options_description& options) {
+  addJsonReport(options);
+  // clang-format off
+  options.add_options()
+    ("markdown", value<std::string>()->value_name("FILE.md"), "write the tables as Markdown")
+    ("csv", value<std::string>()->value_name("FILE.csv"),
+     "write the figures with all digits as CSV")
+    ("html", value<std::string>()->value_name("FILE.html"), "write a self-contained HTML page")
+    ("force,f", bool_switch(), "replace reports that exist");
+  // clang-format on
+}
+
+ReportFiles reportFiles(const cli::Arguments& a) {
+  const auto path = [&](const char* option) { return a.find<std::string>(option).value_or(""); };
+  return {path("report"), path("markdown"), path("csv"), path("html"), a.get<bool>("force")};
+}
+
+/// Checks before the work that the files can be written.
+/// \throws UsageError, RuntimeFailure  a file cannot be written
+void checkReportFiles(const ReportFiles& files, const std::vector<std::filesystem::path>& inputs) {
+  cli::requireSeparate(inputs, {files.json, files.markdown, files.csv, files.html});
+  const auto check = [&](const std::string& file, const char* extension) {
+    if (file.empty() || file == cli::kStandardOutput) return;
+    cli::checkOutput(file, {extension}, files.overwrite);
+  };
+  check(files.json, ".json");
+  check(files.markdown, ".md");
+  check(files.csv, ".csv");
+  check(files.html, ".html");
 }
 
 void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
@@ -230,13 +263,14 @@ void readImages(const cli::Arguments& a, TableOptions& options) {
   if (images.transfers.empty()) images.transfers.push_back(builtInTransfer("viridis:linear"));
 }
 
-}  // namespace
-
+/// All files that a run reads.
 std::vector<std::filesystem::path> inputsOf(const TableOptions& options) {
   std::vector<std::filesystem::path> inputs = options.inputs.paths;
   for (const auto& external : options.externals) inputs.push_back(external.file);
   return inputs;
 }
+
+}  // namespace
 
 std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv) {
   const auto arguments = tableLine().parse(argc, argv);

@@ -38,6 +38,12 @@ struct GalleryOptions {
   std::string lpips;
 };
 
+/// The files of a report; empty for those that are not written.
+struct ReportFiles {
+  std::string json, markdown, csv, html;
+  bool overwrite = false;
+};
+
 struct TableOptions {
   cli::InputFiles inputs;  ///< reference, candidates and transfer functions
   std::filesystem::path reference;
@@ -65,9 +71,6 @@ struct TableOptions {
   cli::Verbosity verbosity = cli::Verbosity::kNormal;
   std::vector<std::string> commandLine;
 };
-
-/// All files that a run reads.
-[[nodiscard]] std::vector<std::filesystem::path> inputsOf(const TableOptions& options);
 
 /// \param argv  arguments, beginning with the command ("table")
 /// \return nothing if --help or --version was printed

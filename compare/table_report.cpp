@@ -10,6 +10,7 @@
 #include "compare/options.h"
 #include "compare/table.h"
 #include "compare/table_record.h"
+#include "esvr/baseline.h"
 #include "programs/files.h"
 #include "programs/page_figures.h"
 #include "programs/run_main.h"
@@ -26,6 +27,35 @@ using report::Html;
 using report::Kind;
 using report::Series;
 using Json = nlohmann::ordered_json;
+
+// What made the table.
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const auto& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+/// One line for the program, the format and each library.
+std::vector<std::string> versionLines() {
+  std::vector<std::string> lines;
+  std::string text = cli::versionText(kProgram);
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  if (!zfpVersion().empty()) lines.push_back(zfpVersion());
+  return lines;
+}
+
+/// The versions that reports of all programs have, and that of ZFP; null if there is none.
+Json versionJson() {
+  Json versions = cli::versionJson();
+  versions["zfp"] = nullptr;
+  if (!zfpVersion().empty()) versions["zfp"] = zfpVersion();
+  return versions;
+}
 
 // Sentences.
 

@@ -11,6 +11,7 @@
 
 #include "cli/run_program.h"
 #include "esvr/container.h"
+#include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 #include "vdb/foreign_grids.h"

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "../field/random_field.h"
+#include "esvr/grid_coding.h"
 
 namespace esvr {
 namespace {

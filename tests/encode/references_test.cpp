@@ -11,6 +11,7 @@
 #include "encode/grids_of_file.h"
 #include "encode/volumes.h"
 #include "esvr/encode.h"
+#include "esvr/error.h"
 #include "esvr/grid_coding.h"
 
 namespace esvr {
