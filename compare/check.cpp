@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "compare/options.h"
 #include "esvr/error.h"
 #include "programs/command_line.h"
 #include "programs/files.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "compare/check.h"
-#include "compare/options.h"
+#include "compare/figures.h"
 #include "compare/table.h"
 #include "esvr/did_you_mean.h"
 #include "esvr/error.h"

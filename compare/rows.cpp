@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "compare/external.h"
+#include "compare/figures.h"
 #include "compare/grid_file.h"
-#include "compare/options.h"
 #include "compare/table.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "compare/external.h"
-#include "compare/options.h"
+#include "compare/figures.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
 #include "esvr/device.h"

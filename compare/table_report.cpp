@@ -7,7 +7,6 @@
 #include <span>
 
 #include "compare/figures.h"
-#include "compare/options.h"
 #include "compare/table.h"
 #include "compare/table_record.h"
 #include "esvr/baseline.h"
