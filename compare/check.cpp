@@ -10,17 +10,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "compare/compare_files.h"
-#include "compare/figures.h"
-#include "compare/grid_file.h"
-#include "compare/options.h"
 #include "esvr/error.h"
 #include "programs/command_line.h"
 #include "programs/files.h"
-#include "programs/option_values.h"
-#include "programs/resources.h"
-#include "programs/run_main.h"
-#include "programs/sequence.h"
 
 namespace esvr::compare {
 

@@ -1,7 +1,5 @@
 // Which grids of two files belong together, what they differ in, and how large the errors are.
 
-#include "compare/compare_files.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -9,12 +9,10 @@
 #include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <functional>
 #include <limits>
 #include <utility>
 
 #include "compare/grid_file.h"
-#include "esvr/baseline.h"
 #include "esvr/error.h"
 #include "esvr/metrics.h"
 #include "programs/option_values.h"
@@ -374,19 +372,13 @@ constexpr int kMaxBisections = 10;  // a step of 10 is then divided into parts o
 constexpr double kSufficientFill = 0.98;
 constexpr double kSufficientExcess = 0.05;  // dB
 
-/// What a search wants of its trials.
-struct Aim {
-  std::function<bool(const ExternalStep&)> allowed;     ///< may this trial be the result?
-  std::function<bool(const ExternalStep&)> tooFine;     ///< should the next bound be larger?
-  std::function<bool(const ExternalStep&)> sufficient;  ///< may the search end with this trial?
-  std::function<bool(const ExternalStep&, const ExternalStep&)> better;
-  bool measuresAll = false;  ///< whether the PSNR of trials that are not allowed matters
-  bool active = false;       ///< whether the PSNR is that over the active voxels
-};
-
+/// Tries bounds and keeps the best trial.
 class Search {
  public:
-  Search(ExternalCodec& codec, const Aim& aim) : codec_(codec), aim_(aim) {}
+  Search(ExternalCodec& codec, const RowGoal& goal)
+      : codec_(codec),
+        bytes_(std::get_if<std::uint64_t>(&goal)),
+        psnr_(std::get_if<MatchGoal>(&goal)) {}
 
   ExternalMatch run() {
     double coarse = codec_.source().peak;
@@ -412,53 +404,39 @@ class Search {
   /// Tries a bound and keeps the trial if it is the best so far.
   bool tooFine(double bound) {
     ExternalStep step{bound, codec_.encode(bound).bytes, std::numeric_limits<double>::quiet_NaN()};
-    if (aim_.measuresAll || aim_.allowed(step)) step.psnr = psnr();
+    if (psnr_ || step.bytes <= *bytes_) step.psnr = psnr();
     match_.steps.push_back(step);
-    if (aim_.allowed(step) && (!match_.found || aim_.better(step, match_.best))) {
+    const bool allowed = psnr_ ? step.psnr >= psnr_->psnr : step.bytes <= *bytes_;
+    if (allowed && (!match_.found || isBetter(step))) {
       match_.best = step;
       match_.found = true;
     }
-    ended_ = aim_.allowed(step) && aim_.sufficient(step);
-    return aim_.tooFine(step);
+    ended_ = allowed && (psnr_ ? step.psnr <= psnr_->psnr + kSufficientExcess
+                               : double(step.bytes) >= kSufficientFill * double(*bytes_));
+    return psnr_ ? allowed : !allowed;
+  }
+
+  [[nodiscard]] bool isBetter(const ExternalStep& step) const {
+    return psnr_ ? step.bytes < match_.best.bytes : step.psnr > match_.best.psnr;
   }
 
   double psnr() {
     const ExternalSource& source = codec_.source();
     const CompareOptions options{.box = source.box, .peak = source.peak};
     const SparseVolume decoded = codec_.decode();
-    return aim_.active ? compareVolumes(source.volume, decoded, options).psnrActive
-                       : psnrOverBox(source.volume, decoded, options);
+    return psnr_ && psnr_->active ? compareVolumes(source.volume, decoded, options).psnrActive
+                                  : psnrOverBox(source.volume, decoded, options);
   }
 
   ExternalCodec& codec_;
-  const Aim& aim_;
+  const std::uint64_t* bytes_;  ///< the goal is one of the two
+  const MatchGoal* psnr_;
   ExternalMatch match_;
   bool ended_ = false;
 };
 
 }  // namespace
 
-ExternalMatch matchSize(ExternalCodec& codec, std::uint64_t bytes) {
-  using Step = ExternalStep;
-  const Aim aim{
-      .allowed = [=](const Step& s) { return s.bytes <= bytes; },
-      .tooFine = [=](const Step& s) { return s.bytes > bytes; },
-      .sufficient =
-          [=](const Step& s) { return double(s.bytes) >= kSufficientFill * double(bytes); },
-      .better = [](const Step& a, const Step& b) { return a.psnr > b.psnr; }};
-  return Search(codec, aim).run();
-}
-
-ExternalMatch matchPsnr(ExternalCodec& codec, const MatchGoal& goal) {
-  using Step = ExternalStep;
-  const double psnr = goal.psnr;
-  const Aim aim{.allowed = [=](const Step& s) { return s.psnr >= psnr; },
-                .tooFine = [=](const Step& s) { return s.psnr >= psnr; },
-                .sufficient = [=](const Step& s) { return s.psnr <= psnr + kSufficientExcess; },
-                .better = [](const Step& a, const Step& b) { return a.bytes < b.bytes; },
-                .measuresAll = true,
-                .active = goal.active};
-  return Search(codec, aim).run();
-}
+ExternalMatch match(ExternalCodec& codec, const RowGoal& goal) { return Search(codec, goal).run(); }
 
 }  // namespace esvr::compare

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "esvr/baseline.h"
@@ -124,14 +125,13 @@ struct ExternalMatch {
   std::vector<ExternalStep> steps;  ///< all trials, in order
 };
 
-/// Searches the bound with the highest PSNR that takes at most `bytes`. Bounds fall from the peak
-/// in steps of 10 until a file is too large, and the last step is bisected until a file is at most
-/// 2 % smaller than the size.
-[[nodiscard]] ExternalMatch matchSize(ExternalCodec& codec, std::uint64_t bytes);
+/// What a row is searched for: a file of at most this many bytes with the highest PSNR, or one that
+/// reaches a PSNR with the fewest bytes.
+using RowGoal = std::variant<std::uint64_t, MatchGoal>;
 
-/// Searches the bound with the fewest bytes that reaches a PSNR, in the same way; the bisection
-/// ends at a file that exceeds the PSNR by at most 0.05 dB.
-/// MatchGoal::dropsVoxels has no meaning here.
-[[nodiscard]] ExternalMatch matchPsnr(ExternalCodec& codec, const MatchGoal& goal);
+/// Searches a bound for a goal. Bounds fall from the peak in steps of 10 until one is too small, and
+/// the last step is bisected until a file is at most 2 % smaller than the size, or exceeds the PSNR
+/// by at most 0.05 dB. MatchGoal::dropsVoxels has no meaning here.
+[[nodiscard]] ExternalMatch match(ExternalCodec& codec, const RowGoal& goal);
 
 }  // namespace esvr::compare

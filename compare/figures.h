@@ -1,15 +1,36 @@
 #pragma once
-/// The figures of a check: one table for options, reports, limits and baselines.
+/// What the commands of esvr-compare share: how errors are measured, and the figures, of which one table is that of
+/// options, reports, limits and baselines.
 
 #include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "esvr/metrics.h"
+#include "esvr/volume.h"
+#include "programs/command_line.h"
 
 namespace esvr::compare {
+
+inline constexpr const char* kProgram = "esvr-compare";
+
+/// The whole command line as words. \param argv  arguments, beginning with the command
+[[nodiscard]] std::vector<std::string> commandLine(int argc, const char* const* argv);
+
+/// Adds --box and --peak, which say how errors are measured.
+void addMeasureOptions(cli::po::options_description& options);
+/// \throws UsageError  the text is no box
+[[nodiscard]] std::optional<Box> boxOption(const cli::Arguments& arguments);
+/// \throws UsageError  the peak is not above 0
+[[nodiscard]] std::optional<double> peakOption(const cli::Arguments& arguments);
+
+/// Adds --report.
+void addJsonReport(cli::po::options_description& options);
+
+// The figures of a check.
 
 enum class FigureId {
   kPsnrBox,

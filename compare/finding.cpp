@@ -1,9 +1,8 @@
-#include "compare/finding.h"
+#include "compare/table_record.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "programs/data_table.h"
 #include "programs/run_main.h"
 
 namespace esvr::compare {

@@ -1,4 +1,5 @@
-#include "compare/gallery.h"
+// The option --images: compares pictures of every row with pictures of the reference from the same views.
+#include "compare/table.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +7,6 @@
 #include <sstream>
 #include <utility>
 
-#include "compare/external.h"
 #include "esvr/error.h"
 #include "esvr/image_metrics.h"
 #include "esvr/metrics.h"
@@ -39,17 +39,16 @@ double lastNumber(const std::string& command, const std::string& text) {
   return *value;
 }
 
-}  // namespace
-
-PictureMetric::PictureMetric(std::string command, std::filesystem::path folder)
-    : command_(std::move(command)), folder_(std::move(folder)) {}
-
-double PictureMetric::of(const Image& reference, const Image& picture) const {
-  const auto command = command_ + " " +
-                       cli::shellWord(written(reference, folder_ / "reference.png").string()) +
-                       " " + cli::shellWord(written(picture, folder_ / "picture.png").string());
-  return lastNumber(command_, outputOf(command, "--lpips"));
+/// The figure that a command of the user computes for a picture.
+double figureOf(const std::string& command, const std::filesystem::path& folder,
+                const Image& reference, const Image& picture) {
+  const std::string line = command + " " +
+                           cli::shellWord(written(reference, folder / "reference.png").string()) +
+                           " " + cli::shellWord(written(picture, folder / "picture.png").string());
+  return lastNumber(command, outputOf(line, "--lpips"));
 }
+
+}  // namespace
 
 // Pictures of voxels.
 
@@ -129,15 +128,13 @@ class Clock {
 
 /// Sums over pictures.
 struct Sums {
-  double squares = 0.0, ssim = 0.0, flip = 0.0, lpips = 0.0;
+  double squares = 0.0, ssim = 0.0, flip = 0.0;
 
-  void add(const Image& reference, const Image& candidate,
-           const std::optional<PictureMetric>& metric) {
+  void add(const Image& reference, const Image& candidate) {
     const ImageMetrics metrics = compareImages(reference, candidate);
     squares += std::pow(10.0, -metrics.psnr / 10.0);
     ssim += metrics.ssim;
     flip += esvr::flip(reference, candidate).mean;
-    if (metric) lpips += metric->of(reference, candidate);
   }
   /// \param cost  figures whose fps and deviceBytes are used
   [[nodiscard]] ImageFigures over(double pictures, ImageFigures cost) const {
@@ -159,8 +156,10 @@ std::string errorPng(const Image& reference, const Image& image) {
 
 Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, const Device& device,
                  const std::filesystem::path& folder, const CancelToken& cancel)
-    : views_(viewsOf(options, reference, cancel)), device_(device) {
-  if (!options.lpips.empty()) lpips_.emplace(options.lpips, folder);
+    : views_(viewsOf(options, reference, cancel)),
+      device_(device),
+      lpips_(options.lpips),
+      folder_(folder) {
   const auto renderer = makeVoxelRenderer(reference, NanoValues::kFloat, device);
   Clock clock(*renderer, device);
   for (const auto& view : views_) references_.push_back(clock.draw(view));
@@ -171,14 +170,16 @@ Gallery::Gallery(const GalleryOptions& options, const SparseVolume& reference, c
 Gallery::Compared Gallery::compare(Renderer& renderer) const {
   Clock clock(renderer, device_);
   Sums sums;
+  double lpips = 0.0;
   Compared result;
   for (std::size_t i = 0; i < views_.size(); ++i) {
     const Image image = clock.draw(views_[i]);
-    sums.add(references_[i], image, lpips_);
+    sums.add(references_[i], image);
+    if (!lpips_.empty()) lpips += figureOf(lpips_, folder_, references_[i], image);
     if (i == 0) result.shown = {report::toPng(image), errorPng(references_[i], image)};
   }
   result.figures = sums.over(double(views_.size()), clock.cost());
-  if (lpips_) result.figures.lpips = sums.lpips / double(views_.size());
+  if (!lpips_.empty()) result.figures.lpips = lpips / double(views_.size());
   return result;
 }
 

@@ -5,7 +5,6 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "programs/option_values.h"
-#include "programs/sequence.h"
 
 namespace esvr::compare {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "compare/check.h"
-#include "compare/options.h"
+#include "compare/figures.h"
 #include "compare/table.h"
 #include "esvr/did_you_mean.h"
 #include "esvr/error.h"
@@ -21,18 +21,16 @@ esvr::cli::CommandLine overview() {
   esvr::cli::CommandLine line(
       {.name = kProgram,
        .purpose = "Compares grids with a reference.",
-       .usage =
-           "  esvr-compare check REF CAND              fail if a grid differs too much\n"
-           "  esvr-compare table REF [CAND.esvr ...]   compare with other ways to store the "
-           "volume\n"
-           "  esvr-compare curves REF [CAND.esvr ...]  plot error over run time and over bytes",
+       .usage = "  esvr-compare check REF CAND              fail if a grid differs too much\n"
+                "  esvr-compare table REF [CAND.esvr ...]   compare with other ways to store the "
+                "volume",
        .notes = "esvr-compare COMMAND --help describes each command.",
        .examples = "  esvr-compare check smoke.vdb smoke.esvr --min-psnr 45"});
-  line.argument("command", "COMMAND: check, table or curves");
+  line.argument("command", "COMMAND: check or table");
   return line;
 }
 
-const std::vector<std::string> kCommands{"check", "table", "curves"};
+const std::vector<std::string> kCommands{"check", "table"};
 
 void run(int argc, const char* const* argv) {
   const std::string_view command = argc > 1 ? argv[1] : "";
@@ -44,13 +42,9 @@ void run(int argc, const char* const* argv) {
     if (const auto options = parseTableOptions(argc - 1, argv + 1)) table(*options);
     return;
   }
-  if (command == "curves") {
-    if (const auto options = parseCurvesOptions(argc - 1, argv + 1)) curves(*options);
-    return;
-  }
   if (!command.empty() && command.front() != '-')
     throw esvr::UsageError("unknown command '" + std::string(command) +
-                           "'; the commands are check, table and curves" +
+                           "'; the commands are check and table" +
                            esvr::didYouMean(command, kCommands));
   (void)overview().parse(argc, argv);
 }

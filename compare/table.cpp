@@ -1,28 +1,27 @@
-// The command `table`: its options, and the rows in their order.
+// The command `table` and its options.
 
 #include "compare/table.h"
 
 #include <algorithm>
-#include <cmath>
 #include <iostream>
-#include <set>
-#include <utility>
 
-#include "compare/rows.h"
-#include "compare/table_record.h"
 #include "esvr/error.h"
 #include "programs/command_line.h"
 #include "programs/files.h"
 #include "programs/option_values.h"
-#include "programs/resources.h"
-#include "programs/run_main.h"
 
 namespace esvr::compare {
 
+using cli::po::bool_switch;
 using cli::po::value;
 
 // Options.
 
+namespace {
+
+using Words = std::vector<std::string>;
+
+/// The options and arguments for the reference and the candidates.
 void addSceneOptions(cli::CommandLine& line) {
   line.argument("reference", "REF.vdb");
   line.repeatedArgument("candidates");
@@ -41,6 +40,38 @@ void addSceneOptions(cli::CommandLine& line) {
   cli::addHostMemory(line);
 }
 
+/// Adds --report and the other forms of a report.
+void addReportOptions(cli::po::options_description& options) {
+  addJsonReport(options);
+  // clang-format off
+  options.add_options()
+    ("markdown", value<std::string>()->value_name("FILE.md"), "write the tables as Markdown")
+    ("csv", value<std::string>()->value_name("FILE.csv"),
+     "write the figures with all digits as CSV")
+    ("html", value<std::string>()->value_name("FILE.html"), "write a self-contained HTML page")
+    ("force,f", bool_switch(), "replace reports that exist");
+  // clang-format on
+}
+
+ReportFiles reportFiles(const cli::Arguments& a) {
+  const auto path = [&](const char* option) { return a.find<std::string>(option).value_or(""); };
+  return {path("report"), path("markdown"), path("csv"), path("html"), a.get<bool>("force")};
+}
+
+/// Checks before the work that the files can be written.
+/// \throws UsageError, RuntimeFailure  a file cannot be written
+void checkReportFiles(const ReportFiles& files, const std::vector<std::filesystem::path>& inputs) {
+  cli::requireSeparate(inputs, {files.json, files.markdown, files.csv, files.html});
+  const auto check = [&](const std::string& file, const char* extension) {
+    if (file.empty() || file == cli::kStandardOutput) return;
+    cli::checkOutput(file, {extension}, files.overwrite);
+  };
+  check(files.json, ".json");
+  check(files.markdown, ".md");
+  check(files.csv, ".csv");
+  check(files.html, ".html");
+}
+
 void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
   options.inputs = a.inputs;
   options.reference = a.get<std::string>("reference");
@@ -54,10 +85,6 @@ void readSceneOptions(const cli::Arguments& a, TableOptions& options) {
   options.threads = a.threads;
   options.verbosity = a.verbosity;
 }
-
-namespace {
-
-using Words = std::vector<std::string>;
 
 constexpr int kMaxRuns = 1000;
 constexpr double kMaxPsnr = 200.0;  // dB, more than rounding to floats leaves
@@ -236,13 +263,14 @@ void readImages(const cli::Arguments& a, TableOptions& options) {
   if (images.transfers.empty()) images.transfers.push_back(builtInTransfer("viridis:linear"));
 }
 
-}  // namespace
-
+/// All files that a run reads.
 std::vector<std::filesystem::path> inputsOf(const TableOptions& options) {
   std::vector<std::filesystem::path> inputs = options.inputs.paths;
   for (const auto& external : options.externals) inputs.push_back(external.file);
   return inputs;
 }
+
+}  // namespace
 
 std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv) {
   const auto arguments = tableLine().parse(argc, argv);
@@ -262,101 +290,19 @@ std::optional<TableOptions> parseTableOptions(int argc, const char* const* argv)
   return options;
 }
 
-// Rows.
-
-namespace {
-
-/// Makes one row after the other. Finished rows are kept if the run is interrupted.
-class TableRun {
- public:
-  TableRun(const TableScene& scene, TableRecord& record, const cli::Log& log)
-      : scene_(scene), options_(scene.options), record_(record), log_(log), maker_(scene) {}
-
-  void run() try {
-    record_.halfBlosc = maker_.baseline("", halfBlosc(), "").bytes;
-    for (const auto& path : options_.candidates) add(maker_.candidate(path));
-    for (const auto& external : options_.externals) add(maker_.external(external));
-    if (options_.fitDefault) add(maker_.fitted({}));
-    if (options_.fitPaper) add(maker_.fitted({.paper = true}));
-    for (const std::uint64_t bytes : options_.fits) add(maker_.fitted({.bytes = bytes}));
-    for (const auto& setting : options_.settings) addBaseline("given", setting);
-    if (options_.settings.empty()) plainRows();
-    matchedRows();
-  } catch (const Cancelled&) {
-    record_.interrupted = true;
-  }
-
- private:
-  void add(TableRow row) { addRow(scene_, log_, std::move(row), record_); }
-
-  void addBaseline(const std::string& group, const BaselineSetting& setting) {
-    add(maker_.baseline(group, setting, displayName(setting)));
-  }
-
-  void plainRows() {
-    if (options_.lossless)
-      for (const auto& setting : losslessSettings()) addLossless(setting);
-    if (options_.quantised)
-      for (const auto& [setting, name] : quantisedSettings(scene_.peak))
-        add(maker_.baseline(kQuantisedGroup, setting, name));
-  }
-
-  /// Half floats have an error unless the values are half floats themselves.
-  void addLossless(const BaselineSetting& setting) {
-    TableRow row = maker_.baseline(kLosslessGroup, setting, displayName(setting));
-    if (row.metrics && row.metrics->maxError > 0.0) row.group = kNearlyLosslessGroup;
-    add(std::move(row));
-  }
-
-  void matchedRows() {
-    std::set<std::uint64_t> sizes(options_.sizes.begin(), options_.sizes.end());
-    std::set<double> psnrs(options_.psnrs.begin(), options_.psnrs.end());
-    for (const auto& row : record_.rows) {
-      if (row.group != kOurGroup) continue;
-      sizes.insert(*row.bytes);
-      if (std::isfinite(row.metrics->psnrBox)) psnrs.insert(row.metrics->psnrBox);
-    }
-    for (const std::uint64_t bytes : sizes) {
-      for (const auto& form : sizeForms(options_)) add(maker_.sizeMatched(form, bytes));
-      for (const auto& command : options_.commands) add(maker_.sizeMatched(command, bytes));
-    }
-    for (const double psnr : psnrs) {
-      const MatchGoal goal{.psnr = psnr};
-      for (const auto& form : psnrForms(options_)) add(maker_.psnrMatched(form, goal));
-      for (const auto& command : options_.commands) add(maker_.psnrMatched(command, goal));
-    }
-    for (const double psnr : options_.activePsnrs) {
-      const MatchGoal goal{.psnr = psnr, .active = true, .dropsVoxels = true};
-      for (const auto& form : activePsnrForms(options_)) add(maker_.psnrMatched(form, goal));
-      for (const auto& command : options_.commands) add(maker_.psnrMatched(command, goal));
-    }
-  }
-
-  const TableScene& scene_;
-  const TableOptions& options_;
-  TableRecord& record_;
-  const cli::Log& log_;
-  RowMaker maker_;
-};
-
-}  // namespace
-
 void table(const TableOptions& options) {
   const cli::ThreadLimit threads(options.threads);
   const cli::Interrupts interrupts;
   const cli::Log log(kProgram, options.verbosity);
   checkReportFiles(options.files, inputsOf(options));
-  const SceneFiles files(options, interrupts.token());
-  TableRecord record = files.record();
-  if (options.zfp && zfpVersion().empty())
-    log.warning("this build has no ZFP; the table has no rows for it");
-  const TableScene scene = files.scene();
-  TableRun(scene, record, log).run();
+  const TableRecord record = makeRows(options, interrupts.token(), log);
   const Completion completion;  // finished rows are written after an interruption, too
   writeReports(options, record);
   if (options.files.json != cli::kStandardOutput && options.verbosity != cli::Verbosity::kQuiet)
     printTable(record, options.verbosity == cli::Verbosity::kVerbose, std::cout);
-  requireAllRows(record);
+  if (record.interrupted)
+    throw RuntimeFailure("interrupted; " + cli::counted(record.rows.size(), "row") +
+                         " made, the others are missing");
 }
 
 }  // namespace esvr::compare

@@ -14,15 +14,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <span>
-#include <string>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "core/atomic_file.h"
 #include "core/memory_budget.h"
-#include "core/read_input.h"
 #include "esvr/device.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"

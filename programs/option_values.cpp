@@ -4,18 +4,11 @@
 #include "programs/option_values.h"
 
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdint>
-#include <limits>
 #include <map>
-#include <string>
-#include <vector>
 
 #include "esvr/did_you_mean.h"
-#include "esvr/error.h"
-#include "programs/run_main.h"
 
 namespace esvr::cli {
 

@@ -3,14 +3,9 @@
 
 #include <cairo.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <memory>
-#include <string>
 
 #include "esvr/error.h"
 #include "esvr/grid.h"

@@ -13,10 +13,8 @@
 #include <atomic>
 #include <cstdlib>
 #include <exception>
-#include <filesystem>
 #include <fstream>
 #include <limits>
-#include <mutex>
 #include <string>
 #include <thread>
 

@@ -7,13 +7,9 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cerrno>
 #include <charconv>
-#include <chrono>
 #include <cmath>
-#include <csignal>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -21,13 +17,9 @@
 #include <new>
 #include <ostream>
 #include <stdexcept>
-#include <string>
 #include <string_view>
-#include <utility>
 
 #include "core/atomic_file.h"
-#include "esvr/error.h"
-#include "esvr/grid.h"
 
 namespace esvr::cli {
 

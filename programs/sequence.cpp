@@ -8,19 +8,13 @@
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <map>
-#include <optional>
 #include <regex>
-#include <set>
 #include <span>
-#include <string_view>
 #include <system_error>
 #include <unordered_set>
 #include <utility>
-#include <vector>
 
 #include "core/atomic_file.h"
-#include "esvr/error.h"
 #include "esvr/sequence_file.h"
 #include "programs/files.h"
 #include "programs/option_values.h"

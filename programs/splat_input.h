@@ -2,7 +2,6 @@
 /// Files of splats as input of a program: their options, and the grids that become of them.
 
 #include <filesystem>
-#include <memory>
 #include <optional>
 
 #include "esvr/splats.h"

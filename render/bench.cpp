@@ -1,4 +1,4 @@
-#include "render/bench.h"
+#include "render/scene.h"
 
 #include <algorithm>
 #include <cmath>

@@ -65,7 +65,7 @@ std::vector<float> depths(const Image& image) {
 }
 
 Bytes written(const Image& image, std::vector<float> pixels,
-              const std::vector<const char*>& channels, const ExrText& text) {
+              const std::vector<const char*>& channels, const PictureText& text) {
   Imf::Header header(image.width, image.height);
   Imf::addComments(header, text.comment);
   header.insert("software", Imf::StringAttribute(text.software));
@@ -86,7 +86,7 @@ Bytes written(const Image& image, std::vector<float> pixels,
 }
 
 Bytes writtenOrFailed(const Image& image, std::vector<float> pixels,
-                      const std::vector<const char*>& channels, const ExrText& text) {
+                      const std::vector<const char*>& channels, const PictureText& text) {
   try {
     return written(image, std::move(pixels), channels, text);
   } catch (const Iex::BaseExc& error) {
@@ -96,11 +96,11 @@ Bytes writtenOrFailed(const Image& image, std::vector<float> pixels,
 
 }  // namespace
 
-Bytes encodeExr(const Image& image, const ExrText& text) {
+Bytes encodeExr(const Image& image, const PictureText& text) {
   return writtenOrFailed(image, linearPixels(image), {"R", "G", "B", "A"}, text);
 }
 
-Bytes encodeDepthExr(const Image& image, const ExrText& text) {
+Bytes encodeDepthExr(const Image& image, const PictureText& text) {
   return writtenOrFailed(image, depths(image), {"Z"}, text);
 }
 

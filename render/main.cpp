@@ -23,7 +23,6 @@
 #include "programs/run_main.h"
 #include "programs/sequence.h"
 #include "programs/video_file.h"
-#include "render/bench.h"
 #include "render/image_files.h"
 #include "render/look.h"
 #include "render/options.h"

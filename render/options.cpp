@@ -11,8 +11,6 @@
 #include "esvr/transfer_function.h"
 #include "programs/command_line.h"
 #include "programs/option_values.h"
-#include "programs/resources.h"
-#include "programs/sequence.h"
 #include "programs/video_file.h"
 #include "render/camera_file.h"
 #include "render/look.h"

@@ -99,7 +99,8 @@ struct PngHeader {
   int width, height, bits;
 };
 
-bool write(const PngStructs& s, Writing& writing, const PngHeader& header, const PngText& text) {
+bool write(const PngStructs& s, Writing& writing, const PngHeader& header,
+           const PictureText& text) {
   png_text chunks[] = {textChunk("Software", text.software), textChunk("Comment", text.comment)};
   if (setjmp(png_jmpbuf(s.png)) != 0) return false;
   png_set_write_fn(s.png, &writing, append, noFlush);
@@ -115,7 +116,7 @@ bool write(const PngStructs& s, Writing& writing, const PngHeader& header, const
 
 }  // namespace
 
-Bytes encodePng(const Image& image, const PngForm& form, const PngText& text) {
+Bytes encodePng(const Image& image, const PngForm& form, const PictureText& text) {
   Writing writing{pixelsOf(image, form), {}, {}, {}};
   const std::size_t ofRow =
       std::size_t(image.width) * std::size_t(kPngChannels) * std::size_t(form.bits / 8);

@@ -5,7 +5,6 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
-#include "esvr/grid_coding.h"
 #include "esvr/transfer_function.h"
 #include "esvr/vdb_io.h"
 

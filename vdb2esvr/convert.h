@@ -1,12 +1,10 @@
 #pragma once
-/// Reads grids of the input, measures their conversions, and says what to do with those that cannot be
-/// converted.
+/// Chooses the grids of a file that are fitted, carried unchanged and left out, reads them, measures their conversions, and
+/// says what to do with those that cannot be converted.
 
-#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "esvr/convert_file.h"
 #include "esvr/error.h"
@@ -15,6 +13,18 @@
 #include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {
+
+// Choosing.
+
+/// The names of the grids of a file, by which options name them.
+[[nodiscard]] GridNames namesOf(const VdbSummary& file);
+
+/// A file without any grid is a valid choice of none; a program for simulations may begin so.
+/// \throws BadInput  a named grid does not exist or its name is ambiguous (the text lists the grids); a
+///                   grid can be neither fitted nor carried; or no grid of a file that has some is left
+/// \throws UsageError  a grid is named by --skip and by another option
+[[nodiscard]] GridChoice chooseGrids(const std::filesystem::path& file, const VdbSummary& summary,
+                                     const WantedGrids& wanted);
 
 // Reading.
 

@@ -3,19 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <limits>
 #include <set>
 #include <utility>
 #include <variant>
 
 #include "esvr/error.h"
-#include "esvr/grid.h"
-#include "programs/command_line.h"
-#include "programs/option_values.h"
 #include "programs/resources.h"
-#include "programs/run_main.h"
-#include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {
 

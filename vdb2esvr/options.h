@@ -14,6 +14,7 @@
 #include "esvr/container.h"
 #include "esvr/convert_file.h"
 #include "esvr/encode.h"
+#include "esvr/grid.h"
 #include "esvr/paper_method.h"
 #include "esvr/vdb_io.h"
 #include "programs/command_line.h"
@@ -21,10 +22,42 @@
 #include "programs/run_main.h"
 #include "programs/sequence.h"
 #include "programs/splat_input.h"
-#include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/progress_bar.h"
 
 namespace esvr::vdb2esvr {
+
+/// Names of grids in the options --grid, --keep and --skip.
+struct WantedGrids {
+  std::vector<std::string> only;  ///< empty: all grids
+  std::vector<std::string> keep;  ///< carried unchanged, even if they could be fitted
+  std::vector<std::string> skip;  ///< left out
+  bool lossless = false;          ///< whether doubles, which are fitted as float32, are carried
+};
+
+/// A grid that is not fitted, and the reason.
+struct NotFitted {
+  GridSummary grid;
+  std::size_t place = 0;  ///< index of the grid in VdbSummary::grids
+  std::string why;
+};
+
+/// A grid that is fitted: one of numbers, or a component of a grid of vectors.
+struct FittedGrid {
+  GridSummary source;                      ///< the grid of the input
+  std::size_t place = 0;                   ///< its index in VdbSummary::grids
+  std::optional<std::size_t> component{};  ///< of vectors
+  std::string uniqueName;  ///< of the grid or the component, by GridNames of the input
+
+  /// The name in its descriptor.
+  [[nodiscard]] std::string storedName() const {
+    return component ? componentName(source.name, *component) : source.name;
+  }
+};
+
+struct GridChoice {
+  std::vector<FittedGrid> fitted;  ///< grids in file order; the components of vectors in theirs
+  std::vector<NotFitted> carried, skipped;
+};
 
 inline constexpr const char* kProgram = "vdb2esvr";
 /// The largest number of ellipsoids that options may name.

@@ -1,7 +1,6 @@
 // The option --paper, which replaces our method by the paper's, and its part of the report.
 
 #include <functional>
-#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -12,7 +11,7 @@
 #include "programs/option_values.h"
 #include "programs/run_main.h"
 #include "vdb2esvr/options.h"
-#include "vdb2esvr/report.h"
+#include "vdb2esvr/records.h"
 
 namespace esvr::vdb2esvr {
 

@@ -10,7 +10,6 @@
 #include <nlohmann/json.hpp>
 
 #include "programs/files.h"
-#include "programs/run_main.h"
 
 namespace esvr::vdb2esvr {
 namespace {

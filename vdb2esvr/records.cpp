@@ -5,10 +5,8 @@
 #include <set>
 #include <unordered_map>
 
-#include "esvr/error.h"
 #include "programs/option_values.h"
 #include "programs/run_main.h"
-#include "programs/sequence.h"
 
 namespace esvr::vdb2esvr {
 

@@ -1,8 +1,8 @@
 #pragma once
-/// The records of a run and of a sequence, from which their summaries and reports are made.
+/// The records of a run and of a sequence, and their summaries and reports.
 
 #include <cstdint>
-#include <filesystem>
+#include <iosfwd>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -13,8 +13,8 @@
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
 #include "programs/sequence.h"
-#include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/convert.h"
+#include "vdb2esvr/options.h"
 
 namespace esvr::vdb2esvr {
 
@@ -149,5 +149,33 @@ struct GridRange {
 /// The error that gives the exit code of a sequence that was interrupted, or in which frames failed
 /// or missed the PSNR; nothing if all is well. Frames that failed count more than missed ones.
 [[nodiscard]] std::optional<Error> whatIsAmiss(const SequenceRecord& record);
+
+// What a run and a sequence say of themselves: the tables that they print (summary.cpp), and the JSON reports of --report,
+// which docs/report.md describes (report.cpp).
+
+void printSummary(const Options& options, const RunRecord& record, std::ostream& out);
+
+/// Prints a row for each frame, the range of PSNR of each grid, and the bytes in all.
+void printSequence(const Options& options, const SequenceRecord& record, std::ostream& out);
+
+/// The options that affect the conversion, with those of its speed (`asked` in the report).
+[[nodiscard]] nlohmann::ordered_json askedJson(const Options& options);
+
+[[nodiscard]] nlohmann::ordered_json makeReport(const Options& options, const RunRecord& record);
+
+/// What a run of the paper's method used and did (paper.cpp).
+[[nodiscard]] nlohmann::ordered_json paperJson(const PaperRecord& record);
+
+/// True if the options want a report in a file.
+[[nodiscard]] bool reportIsFile(const Options& options);
+
+/// The report of a run that failed: its options and the error.
+[[nodiscard]] nlohmann::ordered_json makeFailureReport(const Options& options, const Error& error);
+
+/// The report of a frame from that of its conversion, without what all frames have in common.
+[[nodiscard]] nlohmann::ordered_json frameReport(nlohmann::ordered_json conversion);
+
+[[nodiscard]] nlohmann::ordered_json makeSequenceReport(const Options& options,
+                                                        const SequenceRecord& record);
 
 }  // namespace esvr::vdb2esvr

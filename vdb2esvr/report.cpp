@@ -1,5 +1,5 @@
 // The JSON reports of --report: what was asked for, the grids, a run, and a sequence.
-#include "vdb2esvr/report.h"
+#include "vdb2esvr/records.h"
 
 #include <nlohmann/json.hpp>
 #include <optional>

@@ -19,20 +19,13 @@
 #include <vector>
 
 #include "esvr/convert_file.h"
-#include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/workers.h"
 #include "programs/command_line.h"
 #include "programs/files.h"
 #include "programs/option_values.h"
 #include "programs/resources.h"
-#include "programs/run_main.h"
-#include "vdb2esvr/choose_grids.h"
 #include "vdb2esvr/convert.h"
-#include "vdb2esvr/options.h"
 #include "vdb2esvr/progress_bar.h"
-#include "vdb2esvr/records.h"
-#include "vdb2esvr/report.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -27,7 +27,6 @@
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/records.h"
-#include "vdb2esvr/report.h"
 
 namespace esvr::vdb2esvr {
 namespace {

@@ -1,5 +1,5 @@
 // The tables that a run and a sequence print.
-#include "vdb2esvr/report.h"
+#include "vdb2esvr/records.h"
 
 #include <algorithm>
 #include <cmath>

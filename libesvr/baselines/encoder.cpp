@@ -10,7 +10,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include "baselines/voxels.h"
 #include "core/add_seconds.h"

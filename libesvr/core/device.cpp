@@ -1,7 +1,6 @@
 #include "esvr/device.h"
 
 #include <algorithm>
-#include <limits>
 #include <optional>
 #include <string_view>
 

@@ -1,7 +1,6 @@
 #include "esvr/ellipsoids.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 namespace esvr {

@@ -19,8 +19,8 @@
 #include "esvr/grid.h"
 #include "esvr/metrics.h"
 #include "esvr/quantised.h"
-#include "format/encode.h"
 #include "format/non_finite_section.h"
+#include "format/section_writer.h"
 
 namespace esvr::encode {
 

@@ -7,7 +7,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "core/brick_index.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/volume.h"

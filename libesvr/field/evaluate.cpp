@@ -1,7 +1,6 @@
 #include "field/evaluate.h"
 
 #include <algorithm>
-#include <functional>
 
 #include "core/parallel.h"
 #include "esvr/field.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "esvr/error.h"
 #include "fit/chunks/chunks.h"

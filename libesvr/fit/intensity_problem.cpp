@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "esvr/device.h"
 #include "fit/cuda/make_cuda.h"
 
 namespace esvr {

@@ -1,11 +1,9 @@
 #include "format/bytes.h"
-#include "core/counted.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cerrno>
 #include <system_error>
 

@@ -1,6 +1,5 @@
 // Checks of files and of sequences, which read everything and keep nothing.
 
-#include <algorithm>
 #include <string>
 #include <vector>
 

@@ -1,7 +1,5 @@
 // Reading a container: one grid of it, a whole file, a frame, or a part; and what a file holds without its contents.
 
-#include "format/decode.h"
-
 #include <algorithm>
 #include <limits>
 #include <map>

@@ -4,13 +4,11 @@
 #include "format/ellipsoid_sections.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <numeric>
 #include <type_traits>
-#include <utility>
 
 #include "codec/brick_coder.h"
 #include "codec/lattice.h"

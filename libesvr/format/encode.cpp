@@ -1,6 +1,6 @@
 // Writing a container: the checks of a grid, the order of its ellipsoids, and the sections of a file or of a frame.
 
-#include "format/encode.h"
+#include "format/section_writer.h"
 
 #include <algorithm>
 #include <functional>

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "core/counted.h"
-#include "core/geometry.h"
 #include "esvr/error.h"
 
 namespace esvr::format {

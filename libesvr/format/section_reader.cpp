@@ -5,7 +5,6 @@
 
 #include "esvr/error.h"
 #include "format/frame_table.h"
-#include "format/section_table.h"
 
 namespace esvr::format {
 

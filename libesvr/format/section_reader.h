@@ -1,8 +1,10 @@
 #pragma once
 /// Finds the sections of a file by kind, grid and chunk, and knows which of them were never read.
 
+#include <cstddef>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -79,5 +81,18 @@ class SectionReader {
   MemoryBudget budget_;
   std::map<SectionId, std::size_t> unread_;
 };
+
+// Whole containers (decode.cpp).
+
+/// Decodes a whole container. \throws BadInput, MemoryExceeded
+[[nodiscard]] EsvrFile decode(const ByteSource& source, const ReadLimits& limits = {});
+
+/// Decodes the short form of a frame (frame_table.h).
+/// \throws BadInput, MemoryExceeded
+[[nodiscard]] EsvrFile decodeShort(std::span<const std::byte> bytes, const std::string& name,
+                                   const ReadLimits& limits, const EsvrFile& previous);
+
+/// Decodes a part of a container. \throws BadInput, MemoryExceeded
+[[nodiscard]] PartOfFile decodePart(const ByteSource& source, const ReadPart& part);
 
 }  // namespace esvr::format

@@ -4,8 +4,6 @@
 #include <bit>
 
 #include "format/bytes.h"
-#include "format/frame_table.h"
-#include "format/section_table.h"
 #include "format/voxel_sections.h"
 
 namespace esvr::format {

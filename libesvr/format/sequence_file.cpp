@@ -9,10 +9,9 @@
 #include "core/atomic_file.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
-#include "esvr/sequence_file.h"
-#include "format/decode.h"
-#include "format/encode.h"
 #include "format/frame_table.h"
+#include "format/section_reader.h"
+#include "format/section_writer.h"
 
 namespace esvr::format {
 

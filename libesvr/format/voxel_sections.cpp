@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <utility>
 
@@ -15,7 +14,6 @@
 #include "core/counted.h"
 #include "core/geometry.h"
 #include "esvr/error.h"
-#include "format/bytes.h"
 #include "format/records.h"
 
 namespace esvr::format {

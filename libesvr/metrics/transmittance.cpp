@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <span>
-#include <string>
 #include <utility>
 
 #include "core/parallel.h"
@@ -38,11 +37,10 @@ struct Faces {
 
 /// How values become depths.
 struct DepthRule {
-  bool clamps = true;  ///< whether values below 0 count as 0
   double empty = 0.0;  ///< depth of a voxel outside the bricks; sums are relative to it
 
   [[nodiscard]] double operator()(float value) const {
-    return (clamps ? std::max(double(value), 0.0) : double(value)) - empty;
+    return std::max(double(value), 0.0) - empty;
   }
 };
 
@@ -281,16 +279,6 @@ Box columnsIn(TilePlace place, std::size_t axis, const Box& box) {
   return localBox({place.a, place.b, in.z}, box);
 }
 
-/// How the depths of the other volume follow from the sums over its bricks.
-struct OtherDepth {
-  double empty = 0.0;     ///< depth of a column without a brick
-  bool isChange = false;  ///< whether the reference's depth is to be added
-
-  [[nodiscard]] double operator()(double sum, double reference) const {
-    return sum + empty + (isChange ? reference : 0.0);
-  }
-};
-
 struct Squares {
   Transmittances sums{};
   double columns = 0.0;
@@ -309,9 +297,9 @@ Squares joined(Squares a, const Squares& b) {
 }
 
 /// Compares the pictures along an axis. The sums are formed by a tree that depends on the number of
-/// tiles only.
+/// tiles only. \param empty  depth of a column of the other volume without a brick, beyond which its depths are
 Squares compare(const Scale& scale, std::size_t axis, std::span<const TilePair> pairs,
-                const OtherDepth& otherDepth) {
+                double empty) {
   constexpr std::size_t kPairsPerTask = 16;
   const Transmittances clear = scale.through(0.0);
   const auto addTile = [&](const TilePair& pair, Squares& squares) {
@@ -322,7 +310,7 @@ Squares compare(const Scale& scale, std::size_t axis, std::span<const TilePair> 
       for (int b = firstB; b <= lastB; ++b) {
         const int c = a * kBrickSide + b;
         const double depth = pair.depths ? pair.depths[c] : 0.0;
-        const double other = otherDepth(pair.others ? pair.others[c] : 0.0, depth);
+        const double other = empty + (pair.others ? pair.others[c] : 0.0);
         const Transmittances& light = pair.depths ? pair.light[c] : clear;
         squares.add(light, other == depth ? light : scale.through(other), 1.0);
       }
@@ -335,7 +323,7 @@ Squares compare(const Scale& scale, std::size_t axis, std::span<const TilePair> 
       },
       joined);
   const double rest = scale.columns(axis) - squares.columns;  // columns without a brick
-  if (rest > 0.0) squares.add(clear, scale.through(otherDepth(0.0, 0.0)), rest);
+  if (rest > 0.0) squares.add(clear, scale.through(empty), rest);
   return squares;
 }
 
@@ -377,20 +365,11 @@ TransmittanceReference::TransmittanceReference(const SparseVolume& reference,
   }
 }
 
-TransmittancePsnr TransmittanceReference::measure(const SparseVolume& candidate) const {
-  return measured(candidate, Role::kVolume);
-}
-
-TransmittancePsnr TransmittanceReference::measureChange(const SparseVolume& change) const {
-  return measured(change, Role::kChange);
-}
-
-TransmittancePsnr TransmittanceReference::measured(const SparseVolume& volume, Role role) const {
+TransmittancePsnr TransmittanceReference::measure(const SparseVolume& volume) const {
   if (!std::isfinite(volume.background)) throw BadInput("the background is not finite");
   if (!isDefined()) throw UsageError("the box has no column of voxels that absorbs light");
   const Scale scale{box_, medianDepth_};
-  DepthRule rule{.clamps = role == Role::kVolume};
-  rule.empty = rule(volume.background);
+  const DepthRule rule{DepthRule{}(volume.background)};
   std::optional<TileLayout> own;
   if (!layout_.isOf(volume)) own.emplace(volume);
   const TileLayout& layout = own ? *own : layout_;
@@ -399,9 +378,7 @@ TransmittancePsnr TransmittanceReference::measured(const SparseVolume& volume, R
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const auto pairs = pairTiles({layout_.places[axis], depths_[axis], transmittances_[axis]},
                                  {layout.places[axis], sums[axis]});
-    squares = joined(squares, compare(scale, axis, pairs,
-                                      {.empty = rule.empty * scale.length(axis),
-                                       .isChange = role == Role::kChange}));
+    squares = joined(squares, compare(scale, axis, pairs, rule.empty * scale.length(axis)));
   }
   const auto psnrOf = [&](std::size_t t) {  // infinite without an error
     return -10.0 * std::log10(squares.sums[t] / squares.columns);

@@ -63,18 +63,9 @@ class TransmittanceReference {
   /// Measures a volume. It takes less time if its bricks are those of the reference.
   /// \throws BadInput  a value is not finite
   /// \throws UsageError  it is not isDefined()
-  [[nodiscard]] TransmittancePsnr measure(const SparseVolume& candidate) const;
-
-  /// Measures a change of the reference: the sum of both volumes, where the reference's values below
-  /// 0 are 0 and the sum is not below 0 at any voxel. Only bricks with a change need to be there.
-  /// The result differs from that of measure() by rounding.
-  /// \throws BadInput, UsageError  as for measure()
-  [[nodiscard]] TransmittancePsnr measureChange(const SparseVolume& change) const;
+  [[nodiscard]] TransmittancePsnr measure(const SparseVolume& volume) const;
 
  private:
-  enum class Role { kVolume, kChange };
-  [[nodiscard]] TransmittancePsnr measured(const SparseVolume& volume, Role role) const;
-
   Box box_;
   TileLayout layout_;
   TileDepths depths_;

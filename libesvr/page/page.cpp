@@ -1,19 +1,81 @@
-#include "page/page.h"
+// What the exported page needs beside the C interface of the decoder (esvr/esvr.h): a description
+// of a file, voxels in the form of textures, the tables of a transfer function, and cameras. All of
+// it is the library's own code, so that the page draws what esvr-render draws.
+//
+// The functions are called from JavaScript (src/local/decoder.js), which reads the structs. All their
+// members have four bytes there, pointers too. The caller frees texts by free().
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "capi/objects.h"
 #include "esvr/camera.h"
+#include "esvr/esvr.h"
 #include "esvr/grid_coding.h"
 #include "esvr/transfer_function.h"
+#include "render/cell_bricks.h"
 #include "render/sample_rule.h"
 #include "render/transfer_table.h"
+
+extern "C" {
+
+/// The bricks of a volume that rays march through, as two textures.
+///
+/// Bricks have 8 x 8 x 8 cells and store the 9 x 9 x 9 voxels at their corners, as in the library
+/// (render/brick_march.h). The atlas has room for slots[0] x slots[1] x slots[2] of them, x fastest;
+/// a voxel is (value - background) / scale. The table has four bytes for each brick
+/// of the box, x fastest: the place of its slot along x, y and z and 0, or 0, 0, 0 and the distance
+/// in bricks, at least 1, within which all bricks are empty (the distance 1 is the brick itself).
+struct page_atlas {
+  int level;      ///< voxels are means of 2^level x 2^level x 2^level voxels
+  int origin[3];  ///< first voxel of the table's first brick, in voxels of the level
+  int bricks[3];  ///< size of the table
+  int slots[3];   ///< size of the atlas
+  int count;      ///< number of slots that are used
+  float background;
+  float scale;
+  float least, most;  ///< smallest and largest stored voxel
+  const unsigned char* table;
+  const float* voxels;
+};
+
+/// A transfer function as points in rows of four numbers, as in the viewer's protocol.
+struct page_transfer {
+  int space;  ///< place in RGB, HSV, HSVWrap, Lab, Diverging, Step
+  int color_count, opacity_count;
+  const double* colors;   ///< value, red, green, blue
+  const double* opacity;  ///< value, opacity, midpoint, sharpness
+};
+
+/// The tables of the library's renderers (render/transfer_table.h). Places count
+/// intervals from the lowest value of the transfer function.
+struct page_tables {
+  int intervals;
+  float low, scale;             ///< lowest value and intervals per unit; scale 0: no extent
+  float weak_gradient_squared;  ///< the square of the gradient at which half of the shading is left
+  float least_bend;             ///< intervals; SegmentTableView::leastBend
+  const float* values;          ///< intervals + 1 times red, green, blue, alpha
+  /// side x side times the light of a segment as red, green, blue and alpha, premultiplied. Entry
+  /// (i, j), i fastest, is a segment from the value i to the value j of `side` values at equal distances
+  /// from the first to the last. Null if no segments are wanted.
+  const float* segments;
+  float below[4], above[4];  ///< colors and extinctions beyond the ends; alpha is the extinction
+};
+
+/// What the tables are made for.
+struct page_sampling {
+  double length;       ///< length of a step in units of the length that opacities are given for
+  double first, last;  ///< range of values of the table of segments
+  int side;            ///< of the table of segments; 0: none is wanted
+};
+}
 
 namespace esvr::page {
 namespace {
@@ -230,23 +292,218 @@ Projection projectionOf(int orthographic) {
 
 Vec3 placeAt(const double* numbers) { return {numbers[0], numbers[1], numbers[2]}; }
 
+// The textures of a volume
+
+constexpr int kMostSlots = 255;     ///< places along an axis that a byte of the table can hold
+constexpr int kTableBytes = 4;      ///< bytes of a brick's entry in the table
+constexpr int kCoarsestLevel = 16;  ///< every volume is a single brick long before
+
+/// The size of an atlas that is about a cube and has room for `count` slots; nothing if it would be
+/// too large.
+std::optional<Coord> slotsFor(std::size_t count, int mostSide) {
+  const int most = std::min(kMostSlots, mostSide / kCellBrickSide);
+  const auto ceilOf = [](double a) { return std::max(1, int(std::ceil(a))); };
+  const int x = std::min(most, ceilOf(std::cbrt(double(count))));
+  const int y = std::min(most, ceilOf(std::sqrt(double(count) / x)));
+  const int z = ceilOf(double(count) / x / y);
+  return z <= most ? std::optional(Coord{x, y, z}) : std::nullopt;
+}
+
+/// Distances, in bricks along the axis that is farthest, to the nearest brick that is not empty.
+class Distances {
+ public:
+  Distances(Coord size, const std::vector<Coord>& occupied)
+      : size_(size), of_(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), kFar) {
+    for (const Coord brick : occupied) of_[at(brick)] = 0;
+    // The largest of three distances along axes: one pass for each axis and direction suffices,
+    // because a step along an axis may be combined with steps along the axes before it.
+    for (int axis = 0; axis < 3; ++axis) spread(axis);
+  }
+  [[nodiscard]] std::size_t at(Coord b) const {
+    return (std::size_t(b.z) * std::size_t(size_.y) + std::size_t(b.y)) * std::size_t(size_.x) +
+           std::size_t(b.x);
+  }
+  [[nodiscard]] const std::vector<std::uint8_t>& all() const { return of_; }
+
+ private:
+  static constexpr std::uint8_t kFar = 255;
+
+  /// Chebyshev distance is separable: d(x) = min over x' of max(|x - x'|, d(x')).
+  void spread(int axis) {
+    const std::size_t step = axis == 0   ? 1
+                             : axis == 1 ? std::size_t(size_.x)
+                                         : std::size_t(size_.x) * std::size_t(size_.y);
+    const int length = axis == 0 ? size_.x : (axis == 1 ? size_.y : size_.z);
+    for (std::size_t first = 0; first < of_.size(); ++first)
+      if (first / step % std::size_t(length) == 0) spreadLine(&of_[first], step, length);
+  }
+  void spreadLine(std::uint8_t* line, std::size_t step, int length) {
+    line_.resize(std::size_t(length));
+    for (int i = 0; i < length; ++i) line_[std::size_t(i)] = line[std::size_t(i) * step];
+    for (int i = 0; i < length; ++i) line[std::size_t(i) * step] = nearest(i, length);
+  }
+  [[nodiscard]] std::uint8_t nearest(int i, int length) const {
+    int best = line_[std::size_t(i)];
+    for (int r = 1; r < best; ++r) {
+      const int below = i >= r ? line_[std::size_t(i - r)] : kFar;
+      const int above = i + r < length ? line_[std::size_t(i + r)] : kFar;
+      best = std::min(best, std::max(r, std::min(below, above)));
+    }
+    return std::uint8_t(best);
+  }
+
+  Coord size_;
+  std::vector<std::uint8_t> of_;
+  std::vector<std::uint8_t> line_;
+};
+
+/// An atlas with the memory of its textures.
+struct Atlas : page_atlas {
+  std::vector<std::uint8_t> bytes;
+  std::vector<float> shares;
+};
+
+void set(int (&to)[3], Coord c) { to[0] = c.x, to[1] = c.y, to[2] = c.z; }
+
+/// The largest difference from the background, or 1 if there is none.
+float scaleOf(const BrickAtlas& from, float background) {
+  float largest = 0.0f;
+  for (const float v : from.values) largest = std::max(largest, std::fabs(v - background));
+  return largest > 0.0f ? largest : 1.0f;
+}
+
+class AtlasMaker {
+ public:
+  AtlasMaker(const BrickAtlas& from, const Box& box, Coord slots) : from_(from), box_(box) {
+    set(atlas_->slots, slots);
+  }
+
+  std::unique_ptr<Atlas> make(float background, int level) {
+    Atlas& a = *atlas_;
+    a.level = level;
+    set(a.origin, box_.min * kBrickSide);
+    set(a.bricks, box_.max - box_.min + Coord{1, 1, 1});
+    a.count = int(from_.table.bricks.size());
+    a.background = background;
+    a.scale = scaleOf(from_, background);
+    fillTable();
+    fillVoxels();
+    const auto [least, most] = std::minmax_element(a.shares.begin(), a.shares.end());
+    a.least = *least, a.most = *most;
+    a.table = a.bytes.data(), a.voxels = a.shares.data();
+    return std::move(atlas_);
+  }
+
+ private:
+  [[nodiscard]] Coord brickAt(std::size_t i) const { return from_.table.place(i) - box_.min; }
+  [[nodiscard]] Coord slotOf(std::size_t i) const {
+    const int n = int(i), x = atlas_->slots[0], y = atlas_->slots[1];
+    return {n % x, n / x % y, n / x / y};
+  }
+
+  void fillTable() {
+    std::vector<Coord> bricks;
+    for (std::size_t i = 0; i < from_.table.bricks.size(); ++i) bricks.push_back(brickAt(i));
+    const int(&size)[3] = atlas_->bricks;
+    const Distances distances({size[0], size[1], size[2]}, bricks);
+    auto& bytes = atlas_->bytes;
+    bytes.resize(distances.all().size() * kTableBytes);
+    for (std::size_t b = 0; b < distances.all().size(); ++b)
+      bytes[b * kTableBytes + 3] = distances.all()[b];
+    for (std::size_t i = 0; i < bricks.size(); ++i) {
+      std::uint8_t* const entry = &bytes[distances.at(bricks[i]) * kTableBytes];
+      const Coord slot = slotOf(i);
+      entry[0] = std::uint8_t(slot.x), entry[1] = std::uint8_t(slot.y);
+      entry[2] = std::uint8_t(slot.z);
+    }
+  }
+
+  void fillVoxels() {
+    const int(&slots)[3] = atlas_->slots;
+    width_ = std::size_t(slots[0] * kCellBrickSide),
+    height_ = std::size_t(slots[1] * kCellBrickSide);
+    atlas_->shares.assign(width_ * height_ * std::size_t(slots[2] * kCellBrickSide), 0);
+    for (std::size_t i = 0; i < from_.table.bricks.size(); ++i)
+      fillSlot(&from_.values[i * kCellBrickVoxels], slotOf(i) * kCellBrickSide);
+  }
+  /// \param from  voxels of a brick, z fastest
+  void fillSlot(const float* from, Coord first) {
+    const float perScale = 1.0f / atlas_->scale;
+    for (int x = 0; x < kCellBrickSide; ++x)
+      for (int y = 0; y < kCellBrickSide; ++y)
+        for (int z = 0; z < kCellBrickSide; ++z) {
+          const Coord to = first + Coord{x, y, z};
+          const float share = (*from++ - atlas_->background) * perScale;
+          atlas_->shares[(std::size_t(to.z) * height_ + std::size_t(to.y)) * width_ +
+                         std::size_t(to.x)] = share;
+        }
+  }
+
+  const BrickAtlas& from_;
+  Box box_;
+  std::size_t width_ = 0, height_ = 0;
+  std::unique_ptr<Atlas> atlas_ = std::make_unique<Atlas>();
+};
+
+Box boxOf(const BrickAtlas& atlas) {
+  Box box;
+  for (std::size_t i = 0; i < atlas.table.bricks.size(); ++i) box.expand(atlas.table.place(i));
+  if (box.empty()) box.expand(Coord{});
+  return box;
+}
+
+/// An atlas of a volume; null if its textures would be too large.
+std::unique_ptr<Atlas> atlasOf(const SparseVolume& volume, int level, int mostSide,
+                               double mostBytes) {
+  // The bricks of voxels tell early that an atlas would be too large. An atlas has more bricks.
+  const double perBrick = kCellBrickVoxels * sizeof(float);
+  if (double(volume.brickCount()) * perBrick > mostBytes) return nullptr;
+  const BrickAtlas bricks = makeBrickAtlas(volume);
+  const Box box = boxOf(bricks);
+  const auto slots = slotsFor(bricks.table.bricks.size(), mostSide);
+  const Coord size = box.max - box.min + Coord{1, 1, 1};
+  if (!slots || std::max({size.x, size.y, size.z}) > mostSide) return nullptr;
+  const double slotCount = double(slots->x) * slots->y * slots->z;
+  if (slotCount * perBrick + box.volume() * kTableBytes > mostBytes) return nullptr;
+  return AtlasMaker(bricks, box, *slots).make(volume.background, level);
+}
+
+std::unique_ptr<Atlas> makeAtlas(const SparseVolume& volume, int level, int mostSide,
+                                 double mostBytes) {
+  VolumeLevels levels(volume);
+  for (; level <= kCoarsestLevel; ++level) {
+    levels.prepare(level);
+    if (auto atlas = atlasOf(levels[level], level, mostSide, mostBytes)) return atlas;
+  }
+  throw MemoryExceeded("the volume is too large for this page");
+}
+
 }  // namespace
 }  // namespace esvr::page
 
 using namespace esvr;
 
+extern "C" {
+
+/// A JSON text: the member "grids" of a file in the viewer's protocol, with a usual look.
+/// \return null on failure (esvr_error)
 char* page_grids(const esvr_file* file) {
   char* text = nullptr;
   (void)capi::guarded([&] { text = page::copyOf(page::gridsText(file->content)); });
   return text;
 }
 
+/// A JSON text: the members "colormaps" and "opacities" of the viewer's description.
+/// \return null on failure
 char* page_looks() {
   char* text = nullptr;
   (void)capi::guarded([&] { text = page::copyOf(page::looksText()); });
   return text;
 }
 
+/// Decodes a grid as drawing takes it: voxels that are NaN or infinite are empty. Everything below that takes a volume
+/// takes one of these, whose values are all finite.
+/// \param volume  output; freed by esvr_free_volume
 esvr_status page_decode(const esvr_file* file, int grid, esvr_volume** volume) {
   return capi::guarded([&] {
     const StoredGrid& stored = file->content.grids.at(std::size_t(grid));
@@ -255,6 +512,8 @@ esvr_status page_decode(const esvr_file* file, int grid, esvr_volume** volume) {
   });
 }
 
+/// Counts the active voxels of a volume in `count` intervals from `low` to `high`. Values outside
+/// count in the first or the last one.
 void page_histogram(const esvr_volume* volume, double low, double high, int count, double* counts) {
   std::fill_n(counts, count, 0.0);
   const double perUnit = high > low ? count / (high - low) : 0.0;
@@ -267,6 +526,22 @@ void page_histogram(const esvr_volume* volume, double low, double high, int coun
     }
 }
 
+/// \param level      coarser level of detail to begin with
+/// \param most_side  largest side of a 3D texture, in voxels
+/// \param most_bytes largest size of both textures together; a coarser level is taken if it is
+///                   exceeded
+/// \return null on failure
+page_atlas* page_make_atlas(const esvr_volume* volume, int level, int most_side,
+                            double most_bytes) {
+  std::unique_ptr<page::Atlas> atlas;
+  (void)capi::guarded(
+      [&] { atlas = page::makeAtlas(volume->voxels, level, most_side, most_bytes); });
+  return atlas.release();
+}
+
+void page_free_atlas(page_atlas* atlas) { delete static_cast<page::Atlas*>(atlas); }
+
+/// \return null on failure
 page_tables* page_make_tables(const page_transfer* transfer, const page_sampling* sampling) {
   std::unique_ptr<page::Tables> tables;
   (void)capi::guarded(
@@ -276,6 +551,11 @@ page_tables* page_make_tables(const page_transfer* transfer, const page_sampling
 
 void page_free_tables(page_tables* tables) { delete static_cast<page::Tables*>(tables); }
 
+/// Fits a camera to a box of voxels.
+/// \param box        x0, y0, z0, x1, y1, z1
+/// \param edges      of a voxel in the camera's space, three places; null: a cube
+/// \param direction  from the middle to the eye; null: the usual view
+/// \param camera     output: eye, center, up, and the field of view or the height
 void page_fit(const int* box, const double* edges, const double* direction, int orthographic,
               int width, int height, double* camera) {
   CameraWish wish;
@@ -290,6 +570,7 @@ void page_fit(const int* box, const double* edges, const double* direction, int 
   *camera = orthographic != 0 ? fitted.height : fitted.fov;
 }
 
+/// Checks a camera: eye, center, up, and the field of view or the height.
 esvr_status page_check_camera(const double* camera, int orthographic, int width, int height) {
   return capi::guarded([&] {
     Camera c{page::placeAt(camera), page::placeAt(camera + 3), page::placeAt(camera + 6),
@@ -297,4 +578,5 @@ esvr_status page_check_camera(const double* camera, int orthographic, int width,
     (orthographic != 0 ? c.height : c.fov) = camera[9];
     checkCamera(c, {width, height});
   });
+}
 }

@@ -9,7 +9,6 @@
 
 #include "core/parallel.h"
 #include "field/coarser_field.h"
-#include "field/voxel_rule.h"
 
 namespace esvr {
 

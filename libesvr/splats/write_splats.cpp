@@ -4,8 +4,6 @@
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <string_view>
 
 #include "core/atomic_file.h"
 #include "core/parallel.h"

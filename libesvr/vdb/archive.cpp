@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "esvr/error.h"
-#include "esvr/grid.h"
 #include "esvr/vdb_io.h"
 #include "vdb/properties.h"
 #include "vdb/tree_walk.h"

@@ -1,13 +1,11 @@
 #include "vdb/brick_filler.h"
 
-#include <limits>
 #include <optional>
 #include <string>
 
 #include "core/counted.h"
 #include "esvr/device.h"
 #include "esvr/error.h"
-#include "esvr/volume.h"
 
 namespace esvr::vdb {
 namespace {

@@ -7,7 +7,6 @@
 /// set they become the background with the sign that they had, which distinguishes inside from
 /// outside.
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>

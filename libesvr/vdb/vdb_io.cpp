@@ -1,16 +1,13 @@
 #include "esvr/vdb_io.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <functional>
-#include <memory>
 #include <utility>
 
 #include "core/atomic_file.h"
 #include "core/counted.h"
 #include "core/read_input.h"
 #include "esvr/error.h"
-#include "esvr/grid.h"
 #include "vdb/archive.h"
 #include "vdb/files.h"
 #include "vdb/formats.h"

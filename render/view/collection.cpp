@@ -7,7 +7,6 @@
 #include "esvr/grid.h"
 #include "esvr/vdb_io.h"
 #include "programs/option_values.h"
-#include "programs/sequence.h"
 
 namespace esvr::view {
 

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <span>
 #include <utility>
 
@@ -191,8 +189,8 @@ std::string pngMessage(const Collection& collection, Drawables& drawables,
   const SceneWish& scene = request.scene;
   Painting painting({collection, drawables, scene, request.size, &cancel});
   painting.complete();
-  const render::PngText text{std::string(render::kProgram) + " " + cli::programVersion(),
-                             commandOf(collection, scene, request.size).text};
+  const render::PictureText text{std::string(render::kProgram) + " " + cli::programVersion(),
+                                 commandOf(collection, scene, request.size).text};
   const auto bytes =
       render::encodePng(painting.picture(), {scene.options.background, scene.options.bits}, text);
   return binaryMessage({{"type", "png"}, {"id", request.id}},
@@ -333,16 +331,9 @@ std::optional<LookNames> namesOf(const TransferFunction& f) {
 
 namespace {
 
-/// The shortest text that gives the number back.
-std::string numberText(double v) {
-  std::array<char, 32> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), v).ptr;
-  return {text.data(), end};
-}
-
 std::string listText(std::initializer_list<double> numbers) {
   std::string text;
-  for (const double v : numbers) text += (text.empty() ? "" : ",") + numberText(v);
+  for (const double v : numbers) text += (text.empty() ? "" : ",") + cli::exactNumber(v);
   return text;
 }
 std::string listText(const Vec3& v) { return listText({v[0], v[1], v[2]}); }
@@ -373,9 +364,10 @@ void addCamera(const Camera& camera, Words& to) {
   to.add("--eye", listText(camera.eye));
   to.add("--center", listText(camera.center));
   to.add("--up", listText(camera.up));
-  if (camera.projection == Projection::kPerspective) return to.add("--fov", numberText(camera.fov));
+  if (camera.projection == Projection::kPerspective)
+    return to.add("--fov", cli::exactNumber(camera.fov));
   to.add("--orthographic");
-  to.add("--height", numberText(camera.height));
+  to.add("--height", cli::exactNumber(camera.height));
 }
 
 /// Adds the transfer function. \return the text of a file if options cannot say it
@@ -394,7 +386,7 @@ std::optional<std::string> addTransfer(const TransferFunction& f, Words& to) {
 void addClip(const SceneWish& scene, Words& to) {
   constexpr std::array kAxes{"x=", "y=", "z="};
   if (scene.sliceAxis)
-    return to.add("--slice", kAxes[*scene.sliceAxis] + numberText(*scene.slicePlace));
+    return to.add("--slice", kAxes[*scene.sliceAxis] + cli::exactNumber(*scene.slicePlace));
   if (const auto& clip = scene.options.clip)
     to.add("--clip", listText(clip->low) + "," + listText(clip->high));
 }
@@ -405,8 +397,8 @@ void addRays(const SceneWish& scene, Words& to) {
   const render::Options usual;
   const bool slice = scene.sliceAxis.has_value();
   if (o.opacityLength != usual.opacityLength)
-    to.add("--opacity-length", numberText(o.opacityLength));
-  if (o.step != usual.step) to.add("--step", numberText(o.step));
+    to.add("--opacity-length", cli::exactNumber(o.opacityLength));
+  if (o.step != usual.step) to.add("--step", cli::exactNumber(o.step));
   if (o.mode != usual.mode)
     to.add("--mode", o.mode == RenderMode::kMaximum ? "maximum" : "average");
   const bool post = o.classification == Classification::kPost;

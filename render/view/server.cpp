@@ -6,7 +6,6 @@
 #include <sys/random.h>
 #include <tbb/global_control.h>
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <boost/asio/ip/address.hpp>
@@ -26,11 +25,8 @@
 #include <fstream>
 #include <iterator>
 #include <limits>
-#include <optional>
 #include <span>
 #include <stdexcept>
-#include <string>
-#include <string_view>
 #include <utility>
 
 #include "esvr/error.h"

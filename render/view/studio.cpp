@@ -4,10 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "esvr/device.h"
 #include "esvr/error.h"
 #include "programs/run_main.h"
-#include "render/view/painting.h"
 
 namespace esvr::view {
 

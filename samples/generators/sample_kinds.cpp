@@ -4,10 +4,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "esvr/did_you_mean.h"
 #include "esvr/error.h"

@@ -1,12 +1,10 @@
 #include "generators/tubes.h"
 
-#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <sstream>
 #include <string_view>
 #include <unordered_map>
 

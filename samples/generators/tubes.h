@@ -6,9 +6,7 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <filesystem>
 #include <istream>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>

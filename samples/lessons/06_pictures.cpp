@@ -4,7 +4,6 @@
 // keeps them for the pictures that follow, so it should live as long as its window or its shot.
 
 #include <algorithm>
-#include <cstdio>
 
 #include "esvr/error.h"
 #include "esvr/fit.h"

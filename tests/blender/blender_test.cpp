@@ -21,7 +21,7 @@
 
 #include "cli/conversion.h"
 #include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
+#include "vdb/foreign_grids.h"
 
 namespace esvr {
 namespace {

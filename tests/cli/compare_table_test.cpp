@@ -1,4 +1,4 @@
-// Plan: `esvr-compare table` and `esvr-compare curves` are run as separate processes on a small grid.
+// Plan: `esvr-compare table` is run as a separate process on a small grid.
 // Figures agree with the files, and the command of a row makes the same row.
 //
 // Records of a few rows are made by hand. The tests check which rival is chosen, and the
@@ -12,10 +12,9 @@
 #include <cmath>
 #include <fstream>
 #include <iomanip>
-#include <set>
 
 #include "cli/conversion.h"
-#include "compare/finding.h"
+#include "compare/table_record.h"
 
 namespace esvr::test {
 namespace {
@@ -148,11 +147,13 @@ TEST_F(CompareTable, namesACommandThatMakesTheSameRow) {
 }
 
 TEST_F(CompareTable, fitsEllipsoidsWhereAsked) {
-  const auto report = reportOf("--rows none --fit 2KB --device cpu");
+  const auto report =
+      reportOf({"--rows", "none", "--fit", "2KB", "--device", "cpu", "--html", at("p.html")});
   const Json* row = rowOf(report, "ESVR fitted, 2000");
   ASSERT_NE(row, nullptr);
   EXPECT_LE((*row)["bytes"].get<double>(), 2000);
   EXPECT_GT((*row)["psnr_box"].get<double>(), 20.0);
+  EXPECT_THAT(readText(at("p.html")), Says("Error over run time", "end to end"));
 }
 
 TEST_F(CompareTable, takesExternalResults) {
@@ -458,125 +459,6 @@ INSTANTIATE_TEST_SUITE_P(
                     Refusal{"DIR/none.vdb", 3, "active voxel"},
                     Refusal{"DIR/ref.vdb --csv DIR/ref.vdb", 2, "one file"},
                     Refusal{"DIR/ref.vdb --csv DIR/out.txt", 2, ".csv"}));
-
-ProgramRun curves(const Words& arguments) { return compare("curves", arguments); }
-
-class CompareCurves : public FittedBall {
- protected:
-  [[nodiscard]] Json points() const { return Json::parse(readText(at("c.json")))["points"]; }
-};
-
-std::set<std::string> seriesOf(const Json& points) {
-  std::set<std::string> names;
-  for (const auto& point : points) names.insert(point["series"]);
-  return names;
-}
-
-/// A file holds no times, so only a fit that the command makes has a curve over seconds.
-TEST_F(CompareCurves, hasTheCurveOfAFitAndTheFilesOfBoth) {
-  succeeded(curves({at("ref.vdb"), at("fit.esvr"), "--fit", "3KB", "--device", "cpu",
-                    "--no-baselines", "-o", at("c")}));
-  int ofFit = 0, ofFile = 0;
-  double last = 0.0;
-  for (const auto& point : points()) {
-    EXPECT_EQ(point["series"], "ESVR");
-    if (point["kind"] == "file") ++ofFile;
-    if (point["kind"] != "fit") continue;
-    ++ofFit;
-    EXPECT_GE(point["seconds"].get<double>(), last) << "time goes on";
-    last = point["seconds"];
-  }
-  EXPECT_GT(ofFit, 1);
-  EXPECT_EQ(ofFile, 2);
-  EXPECT_THAT(readText(at("c.csv")), StartsWith("kind,series,name,bytes,seconds,"));
-  EXPECT_THAT(folder_.names(),
-              testing::ElementsAre("c.csv", "c.html", "c.json", "fit.esvr", "ref.vdb"));
-}
-
-TEST_F(CompareCurves, hasEveryPointOnThePage) {
-  succeeded(
-      curves({at("ref.vdb"), "--fit", "3KB", "--no-baselines", "--device", "cpu", "-o", at("c")}));
-  const std::string page = readText(at("c.html"));
-  EXPECT_THAT(page,
-              Says("<h1>At ", "Error over run time", "RMS error over the box, % of the peak"));
-  const auto lines = csvFields(readText(at("c.csv")));
-  ASSERT_GT(lines.size(), 4u);
-  for (std::size_t line = 1; line < lines.size(); ++line)
-    for (const std::size_t c : {3u, 4u, 5u, 6u, 7u})  // bytes to max_error
-      EXPECT_TRUE(page.find("data-value=\"" + lines[line][c] + "\"") < page.size()) << line;
-}
-
-/// The values of the ball reach up to 1; a peak of 100 adds 40 dB to every figure.
-TEST_F(CompareCurves, hasOnePeakForFitsAndFiles) {
-  succeeded(curves({at("ref.vdb"), "--fit", "3KB", "--peak", "100", "--device", "cpu",
-                    "--no-baselines", "-o", at("c")}));
-  const Json all = points();
-  ASSERT_GT(all.size(), 2u);
-  const Json &last = all[all.size() - 2], &file = all.back();
-  ASSERT_EQ(last["kind"], "fit");
-  ASSERT_EQ(file["kind"], "file");
-  // Quantisation may cost some dB, but not half of those of the peak.
-  for (const char* key : {"psnr_box", "psnr_active"})
-    EXPECT_NEAR(last[key].get<double>(), file[key].get<double>(), 20.0) << key;
-}
-
-TEST_F(CompareCurves, showsOnlyThePlotsThatHaveCurves) {
-  succeeded(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "-o", at("c")}));
-  const std::string page = readText(at("c.html"));
-  EXPECT_THAT(page, Says("Error over bytes", "class=\"row ours\"",
-                         testing::Not(HasSubstr("Error over run time"))));
-  EXPECT_THAT(folder_.names(),
-              testing::ElementsAre("c.csv", "c.html", "c.json", "fit.esvr", "ref.vdb"));
-}
-
-TEST_F(CompareCurves, refusesWhatTakesMoreMemoryThanAllowed) {
-  EXPECT_THAT(curves({at("ref.vdb"), at("fit.esvr"), "--no-baselines", "--max-memory", "1KB", "-o",
-                      at("c")}),
-              Fails(5));
-}
-
-TEST_F(CompareCurves, SlowHasBaselinesAtEachSizeAndFramesASecond) {
-  succeeded(curves({at("ref.vdb"), "--fit", "3KB", "--fit", "5KB", "--device", "cpu", "--fps", "24",
-                    "-o", at("c")}));
-  const auto all = points();
-  EXPECT_THAT(seriesOf(all), testing::IsSupersetOf({"ESVR", "NanoVDB FpN Zip"}));
-  for (const auto& point : all)
-    if (point["kind"] == "file") {
-      EXPECT_GT(point["fps"].get<double>(), 0.0);
-      EXPECT_LE(point["bytes"].get<double>(), 5000);
-    }
-  EXPECT_THAT(readText(at("c.html")), HasSubstr("<h3>Pictures per second over bytes</h3>"));
-}
-
-TEST_F(CompareCurves, SlowChoosesSixSizesAndTellsThoseThatAreTooSmall) {
-  const auto run =
-      succeeded(curves({at("ref.vdb"), "--no-baselines", "--device", "cpu", "-o", at("c")}));
-  // The ball's VDB is so small that a hundredth of its size has no room for a grid.
-  std::size_t files = 0, refused = 0;
-  for (const auto& point : points()) files += point["kind"] == "file";
-  for (std::size_t at = 0; (at = run.err.find("no fit of", at)) != std::string::npos; ++at)
-    ++refused;
-  EXPECT_GT(files, 0u);
-  EXPECT_GT(refused, 0u);
-  EXPECT_EQ(files + refused, 6u);
-}
-
-class RefusedCurves : public CompareCurves, public testing::WithParamInterface<Refusal> {};
-
-TEST_P(RefusedCurves, isExplainedAndLeavesNoFile) {
-  writeText(at("there.csv"), "precious");
-  GetParam().expectOf(curves(GetParam().argumentsIn(folder_)));
-  EXPECT_THAT(folder_.names(), testing::ElementsAre("fit.esvr", "ref.vdb", "there.csv"));
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    All, RefusedCurves,
-    testing::Values(Refusal{{}, 2, "REF.vdb"}, Refusal{"DIR/ref.vdb", 2, "--output"},
-                    Refusal{"DIR/ref.vdb -o DIR/there", 1, "there.csv"},
-                    Refusal{"DIR/ref.vdb -o DIR/c --fps 0", 2, "--fps"},
-                    Refusal{"DIR/ref.vdb -o DIR/none/c", 1, "none"},
-                    Refusal{"DIR/none.vdb -o DIR/c", 3, "none.vdb"},
-                    Refusal{"DIR/ref.vdb DIR/none.esvr -o DIR/c", 3, "none.esvr"}));
 
 }  // namespace
 }  // namespace esvr::test

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "cli/run_program.h"
-#include "cli/vdb_inputs.h"
 #include "esvr/container.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/vdb_io.h"
+#include "vdb/foreign_grids.h"
 
 namespace esvr::test {
 
@@ -29,7 +29,7 @@ inline ProgramRun quickFit(const std::string& input, const std::string& output,
       more));
 }
 
-/// Runs a command of the program: "check", "table" or "curves".
+/// Runs a command of the program: "check" or "table".
 inline ProgramRun compare(const std::string& command, const Words& arguments) {
   return runProgram(ESVR_COMPARE, joined({command}, arguments));
 }

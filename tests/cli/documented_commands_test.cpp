@@ -79,7 +79,6 @@ Words quickened(Words words) {
     set(words, "--runs", "1");
     set(words, "--image-size", "32");
   }
-  if (words[0] == "esvr-compare" && words[1] == "curves") set(words, "--fit", "3KB");
   if (words[0] != "esvr2vdb" || !has(words, "--list"))
     if (words[0] != "esvr-compare" || words[1] != "check") words.emplace_back("--force");
   return words;

@@ -4,7 +4,6 @@
 
 #include <map>
 #include <regex>
-#include <set>
 
 #include "cli/run_program.h"
 
@@ -230,29 +229,13 @@ Table tableTests() {
           {"--tf", "CompareOption.tablesPicturesTakeStepAndTransferFunctions"}};
 }
 
-Table curvesTests() {
-  return {{"--box", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"},
-          {"--device", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
-          {"--fit", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
-          {"--force", "CompareOption.curvesAreReplacedWhereForced"},
-          {"--fps", "CompareCurves.SlowHasBaselinesAtEachSizeAndFramesASecond"},
-          {"--grid", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"},
-          {"--max-dense", "CompareOption.maxDenseSkipsZfpInCurves"},
-          {"--max-memory", "CompareCurves.refusesWhatTakesMoreMemoryThanAllowed"},
-          {"--no-baselines", "CompareCurves.hasTheCurveOfAFitAndTheFilesOfBoth"},
-          {"--scratch", "Scratch.IsAFolderThatExistsInEveryProgram"},
-          {"--output", "CompareCurves.hasTheCurveOfAFitAndTheFilesOfBoth"},
-          {"--peak", "CompareOption.curvesTakeTheGridTheBoxAndThePeak"}};
-}
-
 std::vector<Program> programs() {
   return {{"vdb2esvr", VDB2ESVR, "", vdb2esvrTests()},
           {"esvr2vdb", ESVR2VDB, "", esvr2vdbTests()},
           {"render", ESVR_RENDER, "", renderTests()},
           {"view", ESVR_VIEW, "", viewTests()},
           {"check", ESVR_COMPARE, "check", checkTests()},
-          {"table", ESVR_COMPARE, "table", tableTests()},
-          {"curves", ESVR_COMPARE, "curves", curvesTests()}};
+          {"table", ESVR_COMPARE, "table", tableTests()}};
 }
 
 /// The short name of each long name, such as "-g" for "--grid"; empty if there is none.

@@ -283,13 +283,6 @@ class CompareOption : public FolderTest {
     if (std::ranges::count(more, "--row") == 0) more.insert(more.end(), {"--rows", "none"});
     return run("table", joined({at("ref.vdb"), at("fit.esvr"), "--runs", "1"}, more))["rows"][0];
   }
-  /// Returns the points of a curve.
-  [[nodiscard]] std::string curves(const Words& more) const {
-    succeeded(compare(
-        "curves",
-        joined({at("ref.vdb"), at("fit.esvr"), "-o", at("c"), "--no-baselines", "--force"}, more)));
-    return Json::parse(readText(at("c.json")))["points"].back().dump();
-  }
 };
 
 TEST_F(CompareOption, checkTakesTheGridTheBoxAndThePeak) {
@@ -345,35 +338,6 @@ TEST_F(CompareOption, tablesAreReplacedWhereForced) {
   EXPECT_EQ(readText(at("t.csv")), "old");
   succeeded(runProgram(ESVR_COMPARE, forced));
   EXPECT_THAT(readText(at("t.csv")), HasSubstr("fit.esvr"));
-}
-
-TEST_F(CompareOption, curvesTakeTheGridTheBoxAndThePeak) {
-  const std::string usual = curves({});
-  EXPECT_NE(curves("--peak 10"), usual);
-  EXPECT_NE(curves("--grid heat"), usual);
-  EXPECT_NE(curves("--box -40,-40,-40,40,40,40"), usual);
-  EXPECT_EQ(curves({}), usual);
-}
-
-TEST_F(CompareOption, curvesAreReplacedWhereForced) {
-  (void)curves({});
-  const Words arguments{"curves", at("ref.vdb"), at("fit.esvr"), "-o", at("c"), "--no-baselines"};
-  EXPECT_THAT(runProgram(ESVR_COMPARE, arguments), Fails(1));
-}
-
-TEST_F(CompareOption, maxDenseSkipsZfpInCurves) {
-  const auto zfpPoints = [&](const char* bound) {
-    succeeded(compare(
-        "curves", {at("ref.vdb"), at("fit.esvr"), "--max-dense", bound, "-o", at("z"), "--force"}));
-    int points = 0;
-    const Json written = Json::parse(readText(at("z.json")));
-    for (const auto& point : written["points"])
-      points += point["series"].get<std::string>().starts_with("ZFP");
-    return points;
-  };
-  if (zfpVersion().empty()) GTEST_SKIP() << "built without ZFP";
-  EXPECT_GT(zfpPoints("1GB"), 0);
-  EXPECT_EQ(zfpPoints("100"), 0);
 }
 
 // ---- Every program
@@ -475,11 +439,7 @@ INSTANTIATE_TEST_SUITE_P(
                     ProgramCommand{
                         "table",
                         ESVR_COMPARE,
-                        {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}},
-                    ProgramCommand{"curves",
-                                   ESVR_COMPARE,
-                                   {"curves", "DIR/in.vdb", "DIR/in.esvr", "--no-baselines", "-o",
-                                    "DIR/c", "--force"}}),
+                        {"table", "DIR/in.vdb", "DIR/in.esvr", "--rows", "none", "--runs", "1"}}),
     [](const auto& tested) { return std::string(tested.param.name); });
 
 constexpr const char* kDriver = "libcuda.so";

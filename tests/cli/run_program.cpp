@@ -8,12 +8,9 @@
 
 #include <chrono>
 #include <fstream>
-#include <iterator>
-#include <sstream>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
-#include <utility>
 
 extern char** environ;
 

@@ -2,8 +2,6 @@
 // from it, and the options. docs/report.md names exactly the keys that the reports of several runs,
 // which together have every key, have.
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 #include <map>
 #include <regex>
@@ -328,13 +326,6 @@ TEST_F(ComparisonDoc, namesTheKeysOfATable) {
   EXPECT_EQ(keysOf(all_["rows"]), without(keysOf(row), {"device_bytes", "lpips"}));
   for (const char* object : {"encode", "decode", "search"})
     expectNamed(all_["rows"][object], row.at(object), object);
-}
-
-TEST_F(ComparisonDoc, namesTheKeysOfCurves) {
-  succeeded(compare("curves", {at("in.vdb"), at("in.esvr"), "--output", at("c"), "--fit", "1KB",
-                               "--fps", "16", "--device", "cpu"}));
-  merge(all_, Json::parse(readText(at("c.json"))));
-  expectTable(all_, tableAfter(document_, "The report of `curves`"), {}, "curves");
 }
 
 }  // namespace

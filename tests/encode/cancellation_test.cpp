@@ -10,7 +10,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "encode/rate_control.h"
 #include "encode/volumes.h"

@@ -11,8 +11,6 @@
 
 #include <cmath>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "encode/volumes.h"
 #include "esvr/error.h"

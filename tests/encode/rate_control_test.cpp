@@ -7,7 +7,6 @@
 #include <gtest/gtest.h>
 
 #include <tbb/global_control.h>
-#include <algorithm>
 #include <cmath>
 
 #include "../fit/volumes.h"

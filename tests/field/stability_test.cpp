@@ -14,7 +14,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <cmath>
 #include <limits>
@@ -79,39 +78,22 @@ TEST(Rounding, OfDenormalNumbersIsThatOfTheSmallestOnes) {
 }
 
 TEST(Stability, NamesTheVoxelOfAWrongValue) {
-  const Field field = fieldOfShape({"", {}});
   const Coord wrong{10, 21, 33};
-  StabilityOptions options;
-  options.worst = 2;
-  options.evaluate = [&](const Field& f, std::span<const Coord> corners, std::span<float> out) {
-    evaluateBricks(f, corners, out);
-    const auto at = std::ranges::find(corners, brickOf(wrong) * kBrickSide) - corners.begin();
-    out[std::size_t(at * kBrickVoxels + voxelOffset(localOf(wrong)))] += 0.5f;
+  const auto with = [&](float error) {
+    return measureStability(
+        fieldOfShape({"", {}}),
+        {.evaluate = [&](const Field& f, std::span<const Coord> corners, std::span<float> out) {
+          evaluateBricks(f, corners, out);
+          const auto at = std::ranges::find(corners, brickOf(wrong) * kBrickSide) - corners.begin();
+          out[std::size_t(at * kBrickVoxels + voxelOffset(localOf(wrong)))] += error;
+        }});
   };
-  const Stability s = measureStability(field, options);
+  const Stability s = with(0.5f);
   EXPECT_NEAR(s.largest, 0.5, 1e-4);
-  ASSERT_EQ(s.worst.size(), 2u);
-  EXPECT_EQ(s.worst[0].at, wrong);
-  EXPECT_EQ(s.worst[0].corner, (Coord{8, 16, 32}));
-  EXPECT_LT(s.worst[1].largest, 1e-4);
+  EXPECT_EQ(s.at, wrong);
   EXPECT_NEAR(s.rms, 0.5 / std::sqrt(double(s.sampled) * kBrickVoxels), 1e-5);
   EXPECT_GT(s.shareOfBound, 100.0);
-}
-
-TEST(Stability, FindsValuesThatAreNotFinite) {
-  StabilityOptions options;
-  options.evaluate = [](const Field&, std::span<const Coord>, std::span<float> out) {
-    std::ranges::fill(out, std::numeric_limits<float>::quiet_NaN());
-  };
-  const Stability s = measureStability(fieldOfShape({"", {}}), options);
-  EXPECT_EQ(s.largest, std::numeric_limits<double>::infinity());
-  EXPECT_EQ(correctDigits(s.largest, s.peak), 0);
-}
-
-TEST(Stability, ComparesWhatIsLeftOfClampedValues) {
-  StabilityOptions options;
-  options.range = ValueRange{0.0f, 0.0f};
-  EXPECT_EQ(measureStability(fieldOfShape({"", {}}), options).largest, 0.0);
+  EXPECT_TRUE(std::isinf(with(std::numeric_limits<float>::quiet_NaN()).largest));
 }
 
 /// Spheres with a support of less than three voxels, all with the same center.
@@ -126,98 +108,19 @@ Field spheresAtOneVoxel(std::initializer_list<float> intensities) {
 
 TEST(Stability, CountsOverlapAndCancellation) {
   const Stability one = measureStability(spheresAtOneVoxel({2.0f}));
-  EXPECT_EQ(one.meanOverlap, 1.0);
   EXPECT_EQ(one.largestOverlap, 1u);
-  EXPECT_EQ(one.meanCancellation, 1.0);
+  EXPECT_EQ(one.cancellation, 1.0);
   EXPECT_NEAR(one.peak, 2.0, 1e-12);
   const Stability three = measureStability(spheresAtOneVoxel({2.0f, -1.0f, 1.0f}));
-  EXPECT_EQ(three.meanOverlap, 3.0);
   EXPECT_EQ(three.largestOverlap, 3u);
-  EXPECT_NEAR(three.meanCancellation, 2.0, 1e-12);
-  EXPECT_NEAR(three.largestCancellation, 2.0, 1e-12);
-}
-
-TEST(Stability, IsThatOfNothingWithoutEllipsoids) {
-  const Stability s = measureStability(Field{});
-  EXPECT_EQ(s.sampled, 0u);
-  EXPECT_EQ(s.largest, 0.0);
-  EXPECT_EQ(s.extremes.smallestScale, 0.0);
-  EXPECT_TRUE(s.worst.empty());
+  EXPECT_NEAR(three.cancellation, 2.0, 1e-12);
 }
 
 TEST(Stability, TakesSamplesEvenlyAndWhereTheExtremesAre) {
-  const Field field = fieldOfShape({"", {.count = 300, .extent = 200.0}});
-  StabilityOptions options;
-  options.samples = 10, options.worst = 100;
-  const Stability s = measureStability(field, options);
-  EXPECT_GE(s.sampled, 10u);
+  const Stability s =
+      measureStability(fieldOfShape({"", {.count = 300, .extent = 200.0}}), {.samples = 10});
+  EXPECT_GT(s.sampled, 10u);
   EXPECT_LE(s.sampled, 14u);
-  EXPECT_EQ(s.bricks, reachedBricks(field).size());
-  options.within = {{0, 0, 0}, {7, 7, 7}};
-  EXPECT_LE(measureStability(field, options).bricks, 1u);
-  const std::vector<Coord> given{{0, 0, 0}, {0, 0, 8}};
-  options.bricks = given;
-  EXPECT_EQ(measureStability(field, options).sampled, 2u);
-}
-
-TEST(Stability, DoesNotDependOnTheNumberOfThreads) {
-  const Field field = fieldOfShape({"", {.count = 200}});
-  const auto figures = [&] {
-    const Stability s = measureStability(field);
-    return std::array{s.largest, s.rms, s.bound, s.meanOverlap, s.meanCancellation};
-  };
-  const auto all = figures();
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  EXPECT_EQ(figures(), all);
-}
-
-TEST(CorrectDigits, AreThoseBelowThePeak) {
-  EXPECT_EQ(correctDigits(0.0, 1.0), 17);
-  EXPECT_EQ(correctDigits(1e-4, 1.0), 4);
-  EXPECT_EQ(correctDigits(9e-4, 1.0), 3);
-  EXPECT_EQ(correctDigits(1e-4, 100.0), 6);
-  EXPECT_EQ(correctDigits(2.0, 1.0), 0);
-  EXPECT_EQ(correctDigits(1e-30, 0.0), 0);
-  EXPECT_EQ(correctDigits(std::numeric_limits<double>::quiet_NaN(), 1.0), 0);
-}
-
-// The ellipsoids that are most difficult to evaluate.
-
-TEST(ExtremeEllipsoids, AreThoseOfTheEllipsoids) {
-  Field field = randomField({.count = 3, .kappa = 4.0f});
-  Ellipsoids& e = field.chunks[0].ellipsoids;
-  e.logScale = {std::vector{0.0f, std::log(0.1f), 1.0f},
-                {0.0f, std::log(100.0f), 1.0f},
-                {std::log(300.0f), 0.0f, 1.0f}};
-  e.intensity = {1.0f, -3.0f, 0.5f};
-  const FieldExtremes all = extremesOf(field);
-  EXPECT_NEAR(all.smallestScale, 0.1, 1e-7);
-  EXPECT_NEAR(all.largestScale, 300.0, 1e-3);
-  EXPECT_NEAR(all.largestAspect, 1000.0, 1e-2);
-  EXPECT_NEAR(all.largestCondition, 1e6, 20.0);
-  EXPECT_EQ(all.lowestKappa, 4.0);
-  EXPECT_EQ(all.highestKappa, 4.0);
-  EXPECT_EQ(all.smallestIntensity, 0.5);
-  EXPECT_EQ(all.largestIntensity, 3.0);
-  e.kappa = {-1.0f, 2.0f, 7.0f};
-  EXPECT_EQ(extremesOf(field).lowestKappa, -1.0);
-  EXPECT_EQ(extremesOf(field).highestKappa, 7.0);
-}
-
-TEST(ExtremeEllipsoids, HaveCentersInIndexSpace) {
-  Field field = randomField({.count = 3, .extent = 1.0, .origin = {100, 0, -8}});
-  field.chunks.push_back(
-      randomField({.count = 1, .extent = 1.0, .intensity = 0.0, .origin = {5000, 8, 8}}).chunks[0]);
-  for (Chunk& chunk : field.chunks)
-    for (auto& center : chunk.ellipsoids.center) std::ranges::fill(center, 2.6f);
-  Ellipsoids& first = field.chunks[0].ellipsoids;
-  for (auto& scale : field.chunks[1].ellipsoids.logScale) scale[0] = 3.0f;
-  for (auto& scale : first.logScale) std::ranges::fill(scale, 0.0f);
-  first.logScale[2] = {0.0f, -1.0f, 0.5f};  // the second one is the smallest, and the longest
-  const Coord inFirst{103, 3, -5}, inSecond{5003, 11, 11};
-  EXPECT_THAT(centersOfExtremes(field), testing::ElementsAre(inFirst, inSecond, inFirst, inFirst))
-      << "smallest scale, largest scale, aspect ratio, intensity";
-  EXPECT_TRUE(centersOfExtremes({}).empty());
 }
 
 // The reference.
@@ -255,8 +158,9 @@ TEST(ReferenceBrick, HasALargerBoundForIntegerSums) {
   const Field field = randomField({.count = 40});
   const ReferenceField reference(field);
   const ReferenceBrick brick = reference.evaluate({16, 16, 16});
-  EXPECT_GT(reference.bound(brick, 0, {.integerSums = true}), reference.bound(brick, 0, {}));
-  EXPECT_GT(reference.bound(brick, 0, {}), 0.0);
+  EXPECT_GT(reference.bound(brick, 0, DeviceKind::kCuda),
+            reference.bound(brick, 0, DeviceKind::kCpu));
+  EXPECT_GT(reference.bound(brick, 0, DeviceKind::kCpu), 0.0);
 }
 
 // The bounds.

@@ -1,19 +1,22 @@
 // Plan: the gradients of 1/2 sum r^2 by every parameter of every ellipsoid and by kappa are
 // compared with central differences of a float64 sum over all voxels of a dense box. This is done
 // for a random field, including bricks that only supports reach, and for ellipsoids of every shape
-// and kernel (gradient_cases.h). For these shapes the adjoint identity <g, dV> = <dL, dtheta> is
+// and kernel (device_cases.h). For these shapes the adjoint identity <g, dV> = <dL, dtheta> is
 // checked for a random g: the residual of a random target, as in the default fit, and a given g, as
 // in the paper's method.
+//
+// The tests of intensities (device_cases.h) run on the CPU; the bits do not depend on the number of threads.
 
 #include <gtest/gtest.h>
 
+#include <tbb/global_control.h>
 #include <algorithm>
 #include <cmath>
 
 #include "fit/adam.h"
 #include "fit/cpu/cpu_pass.h"
+#include "fit/device_cases.h"
 #include "fit/ellipsoid.h"
-#include "fit/gradient_cases.h"
 #include "fit/gradient_scene.h"
 
 namespace esvr {
@@ -191,6 +194,25 @@ TEST_P(GradientCases, OfAGivenDerivativeSatisfyTheAdjointIdentity) {
 
 INSTANTIATE_TEST_SUITE_P(All, GradientCases, testing::ValuesIn(test::gradientCases()),
                          [](const auto& c) { return test::nameOf(c.param); });
+
+// ---- Intensities
+
+using test::Intensities;
+INSTANTIATE_TEST_SUITE_P(Cpu, Intensities, testing::Values("cpu"));
+
+TEST(IntensityProblem, GivesTheSameBitsOnOneThread) {
+  const Field field = test::someField();
+  const SparseVolume volume = test::tubeVolume();
+  const IntensityTarget target = test::targetOf(volume);
+  std::vector<float> many(field.ellipsoidCount(), 0.2f), one = many;
+  IntensityProblem problem(target);
+  problem.setShapes(field);
+  (void)problem.solve(many, 10);
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+  problem.setShapes(field);
+  (void)problem.solve(one, 10);
+  EXPECT_EQ(many, one);
+}
 
 }  // namespace
 }  // namespace esvr

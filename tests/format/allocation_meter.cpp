@@ -1,4 +1,4 @@
-#include "format/allocation_meter.h"
+#include "format/sample_files.h"
 
 #include <cstdlib>
 #include <new>

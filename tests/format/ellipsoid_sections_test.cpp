@@ -8,14 +8,12 @@
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
-#include <string>
 
 #include "esvr/container.h"
 #include "esvr/encode.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/grid_coding.h"
-#include "format/allocation_meter.h"
 #include "format/bytes.h"
 #include "format/sample_files.h"
 #include "support/files.h"

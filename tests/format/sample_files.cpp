@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <functional>
 #include <iterator>
 #include <random>
@@ -14,9 +13,8 @@
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
 #include "format/bytes.h"
-#include "format/encode.h"
 #include "format/non_finite_section.h"
-#include "format/section_table.h"
+#include "format/section_writer.h"
 #include "format/sequence_file.h"
 #include "support/non_finite.h"
 

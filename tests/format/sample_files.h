@@ -145,4 +145,15 @@ class CraftedFile {
   std::vector<CraftedSection> sections_;
 };
 
+/// Counts the bytes requested from operator new (allocation_meter.cpp), which shows how much memory a hostile file makes a
+/// reader take: those requested by this thread since the meter was made. Freed memory is not subtracted.
+class AllocationMeter {
+ public:
+  AllocationMeter();
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  std::size_t start_;
+};
+
 }  // namespace esvr::test

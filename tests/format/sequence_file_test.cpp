@@ -12,7 +12,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <numeric>
 
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"

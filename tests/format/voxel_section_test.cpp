@@ -19,7 +19,6 @@
 #include "esvr/grid_coding.h"
 #include "field/random_field.h"
 #include "fit/volumes.h"
-#include "format/allocation_meter.h"
 #include "format/non_finite_section.h"
 #include "format/sample_files.h"
 #include "format/voxel_sections.h"

@@ -16,7 +16,7 @@
 #include "esvr/sequence_file.h"
 #include "fit/volumes.h"
 #include "format/bytes.h"
-#include "format/decode.h"
+#include "format/section_reader.h"
 #include "fuzz/fuzzer.h"
 
 namespace esvr::fuzz {

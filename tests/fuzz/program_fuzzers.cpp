@@ -1,7 +1,6 @@
 // Plan: what the programs read beside volumes gets any bytes: baselines, cameras, messages and skeletons.
 
 #include <cmath>
-#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <sstream>
 

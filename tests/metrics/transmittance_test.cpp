@@ -341,17 +341,5 @@ TEST(TransmittanceReference, MeasuresAsTransmittancePsnrDoes) {
     EXPECT_TRUE(areSame(reference.measure(candidate), *transmittancePsnr(a, candidate)));
 }
 
-TEST(TransmittanceReference, MeasuresAChangeAsTheChangedVolume) {
-  const Box box{{0, 0, 0}, {30, 20, 10}}, changed{{10, 10, 0}, {19, 30, 30}};
-  const auto value = [](Coord c) { return 1.0f + float((c.x * 5 + c.y * 3 + c.z) % 8); };
-  const auto change = [](Coord c) { return float((c.x + c.y + c.z) % 3) - 1.0f; };
-  const SparseVolume a = volumeOf(box, value);
-  const metrics::TransmittanceReference reference(a);
-  const auto want = reference.measure(
-      volumeOf(box, [&](Coord c) { return value(c) + (changed.contains(c) ? change(c) : 0.0f); }));
-  expectNear(reference.measureChange(volumeOf(changed, change)), want);
-  expectExact(reference.measureChange(SparseVolume{}));
-}
-
 }  // namespace
 }  // namespace esvr

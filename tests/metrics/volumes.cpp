@@ -1,9 +1,18 @@
 #include "metrics/volumes.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 
 namespace esvr::test {
 namespace {
+
+template <class Visit>
+void forEachVoxel(const Box& box, Visit visit) {
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z});
+}
 
 BrickInput emptyBrick(Coord brick, float background) {
   BrickInput input{.corner = brick * kBrickSide, .values = {}, .active = {}};
@@ -62,9 +71,7 @@ SparseVolume volumeOf(const std::vector<Voxel>& voxels, float background) {
 
 SparseVolume volumeOf(const Box& box, const std::function<float(Coord)>& value, float background) {
   VolumeBuilder builder(background);
-  for (int x = box.min.x; x <= box.max.x; ++x)
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) builder.set({x, y, z}, value({x, y, z}));
+  forEachVoxel(box, [&](Coord voxel) { builder.set(voxel, value(voxel)); });
   return builder.finish();
 }
 
@@ -83,6 +90,104 @@ SparseVolume randomVolume(const RandomVolumeOptions& options) {
 SparseVolume movedBy(SparseVolume volume, Coord by) {
   volume.origin = volume.origin + by;
   return volume;
+}
+
+// The metrics by their definitions.
+
+namespace {
+
+bool isActive(const SparseVolume& volume, Coord voxel) {
+  const Coord relative = voxel - volume.origin;
+  const auto b = findBrick(volume, brickOf(relative));
+  return b && volume.active[*b].test(voxelOffset(localOf(relative)));
+}
+
+double errorAt(const SparseVolume& a, const SparseVolume& b, Coord voxel) {
+  return std::abs(double(valueAt(a, voxel)) - double(valueAt(b, voxel)));
+}
+
+void sumOverBox(VolumeMetrics& m, const SparseVolume& a, const SparseVolume& b, const Box& box) {
+  double squared = 0.0;
+  m.maxError = -1.0;
+  forEachVoxel(box, [&](Coord v) {
+    const double error = errorAt(a, b, v);
+    squared += error * error;
+    m.massReference += double(valueAt(a, v)) - a.background;
+    m.massCandidate += double(valueAt(b, v)) - b.background;
+    m.maxError = std::max(m.maxError, error);
+  });
+  m.boxVoxels = box.volume();
+  m.mseBox = squared / m.boxVoxels;
+}
+
+void sumOverActive(VolumeMetrics& m, const SparseVolume& a, const SparseVolume& b,
+                   const Box& everywhere) {
+  double squared = 0.0;
+  std::size_t both = 0;
+  std::vector<double> errors;
+  forEachVoxel(everywhere, [&](Coord v) {
+    const bool inA = isActive(a, v), inB = isActive(b, v);
+    const double error = errorAt(a, b, v);
+    if (inA) squared += error * error;
+    if (inA) ++m.activeVoxels;
+    if (inA && inB) ++both;
+    if (inA || inB) errors.push_back(error);
+  });
+  std::sort(errors.begin(), errors.end());
+  const auto rank = std::size_t(std::ceil(0.999L * static_cast<long double>(errors.size())));
+  m.p999Error = errors.at(rank - 1);
+  m.mseActive = squared / double(m.activeVoxels);
+  m.iou = double(both) / double(errors.size());
+}
+
+double gaussian(int distance) { return std::exp(-distance * distance / (2.0 * 1.5 * 1.5)); }
+
+/// SSIM at one voxel. The weights are normalised over the part of the 11^3 window inside the box.
+double ssimAt(const SparseVolume& a, const SparseVolume& b, const Box& box, double peak, Coord at) {
+  const Coord radius{5, 5, 5};
+  const Box window{maxCoord(at - radius, box.min), minCoord(at + radius, box.max)};
+  double weights = 0.0, meanA = 0.0, meanB = 0.0;
+  const auto weightOf = [&](Coord v) {
+    return gaussian(v.x - at.x) * gaussian(v.y - at.y) * gaussian(v.z - at.z);
+  };
+  forEachVoxel(window, [&](Coord v) {
+    weights += weightOf(v);
+    meanA += weightOf(v) * valueAt(a, v);
+    meanB += weightOf(v) * valueAt(b, v);
+  });
+  meanA /= weights;
+  meanB /= weights;
+  double varA = 0.0, varB = 0.0, covariance = 0.0;
+  forEachVoxel(window, [&](Coord v) {
+    const double w = weightOf(v) / weights;
+    const double da = valueAt(a, v) - meanA, db = valueAt(b, v) - meanB;
+    varA += w * da * da;
+    varB += w * db * db;
+    covariance += w * da * db;
+  });
+  const double c1 = std::pow(0.01 * peak, 2), c2 = std::pow(0.03 * peak, 2);
+  return (2 * meanA * meanB + c1) * (2 * covariance + c2) /
+         ((meanA * meanA + meanB * meanB + c1) * (varA + varB + c2));
+}
+
+}  // namespace
+
+VolumeMetrics denseMetrics(const SparseVolume& reference, const SparseVolume& candidate,
+                           const Box& box, const Box& everywhere, double peak) {
+  VolumeMetrics m;
+  m.peak = peak;
+  sumOverBox(m, reference, candidate, box);
+  sumOverActive(m, reference, candidate, everywhere);
+  m.psnrBox = 10.0 * std::log10(peak * peak / m.mseBox);
+  m.psnrActive = 10.0 * std::log10(peak * peak / m.mseActive);
+  return m;
+}
+
+double denseSsim(const SparseVolume& reference, const SparseVolume& candidate, const Box& box,
+                 double peak) {
+  double sum = 0.0;
+  forEachVoxel(box, [&](Coord v) { sum += ssimAt(reference, candidate, box, peak, v); });
+  return sum / box.volume();
 }
 
 }  // namespace esvr::test

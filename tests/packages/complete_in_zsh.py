@@ -19,7 +19,7 @@ zle -N keep; bindkey '^X' keep; bindkey '^U' kill-whole-line; bindkey '^I' expan
 """
 EXPECTED = {
     "vdb2esvr --psn": "vdb2esvr --psnr ",
-    "esvr-compare cur": "esvr-compare curves ",
+    "esvr-compare ta": "esvr-compare table ",
     "esvr-compare check --max-b": "esvr-compare check --max-bytes ",
 }
 

@@ -15,7 +15,6 @@
 
 #include <limits>
 
-#include "programs/data_table.h"
 #include "programs/page_figures.h"
 
 namespace esvr::report {

@@ -99,14 +99,14 @@ def test_copies_are_the_objects_themselves(volume, grid):
 
 
 def test_damaged_pickles_are_refused(volume):
-    restore, (state,) = volume.__reduce__()
+    restore, (function, state) = volume.__reduce__()
     with pytest.raises(esvr.BadInput, match="another version"):
-        restore((99, *state[1:]))
+        restore(function, (99, *state[1:]))
     voxels = state[2]
     for wrong in ((voxels[0], voxels[1], voxels[2][:-1], *voxels[3:]), (*voxels[:4], voxels[4][:-1]),
                   (voxels[0], voxels[1], voxels[2][::-1], *voxels[3:])):
         with pytest.raises(esvr.BadInput, match="damaged"):
-            restore((*state[:2], wrong, *state[3:]))
+            restore(function, (*state[:2], wrong, *state[3:]))
 
 
 def test_sequences_open_their_file_again(frames):

@@ -10,7 +10,6 @@
 #include <openvdb/io/Stream.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <fstream>

@@ -308,14 +308,6 @@ INSTANTIATE_TEST_SUITE_P(
         RealFile{"edge/double_grid.vdb", 524288, 1024, ValueType::kDouble, kFog,
                  "UniformScaleTranslateMap"}));
 
-TEST(EdgeFiles, BackgroundOneIsTheValueOutsideTheBricks) {
-  ESVR_NEEDS_DATA();
-  const auto grid = readGrid(dataDir() / "edge/background_one.vdb", "density");
-  EXPECT_EQ(grid.descriptor.background, 1.0);
-  EXPECT_EQ(grid.volume.background, 1.0f);
-  EXPECT_EQ(valueAt(grid.volume, {1000, 0, 0}), 1.0f);
-}
-
 TEST(EdgeFiles, ThreeGridsOfOneNameAreToldApartByNumber) {
   ESVR_NEEDS_DATA();
   const auto path = dataDir() / "edge/three_grids_named_density.vdb";
@@ -323,29 +315,6 @@ TEST(EdgeFiles, ThreeGridsOfOneNameAreToldApartByNumber) {
   EXPECT_EQ(activeVoxelCount(readGrid(path, "density[0]").volume), 491u);
   EXPECT_EQ(activeVoxelCount(readGrid(path, "density[1]").volume), 2222u);
   EXPECT_EQ(activeVoxelCount(readGrid(path, "density[2]").volume), 803u);
-}
-
-TEST(EdgeFiles, VectorsAndPointsAreListedWithTheirType) {
-  ESVR_NEEDS_DATA();
-  const auto vectors = inspectVdb(dataDir() / "edge/vec3_velocity.vdb");
-  ASSERT_EQ(vectors.grids.size(), 1u);
-  EXPECT_EQ(vectors.grids[0].name, "vel");
-  EXPECT_THAT(vectors.grids[0].skipReason, HasSubstr("vec3s"));
-  const auto points = inspectVdb(dataDir() / "edge/points_only.vdb");
-  ASSERT_EQ(points.grids.size(), 1u);
-  EXPECT_THAT(points.grids[0].skipReason, HasSubstr("ptdataidx32"));
-  EXPECT_THROW((void)readGrid(dataDir() / "edge/points_only.vdb", "points"), BadInput);
-}
-
-TEST(EdgeFiles, AGridOpenVdbCannotReadDoesNotHideTheOthers) {
-  ESVR_NEEDS_DATA();
-  const auto path = dataDir() / "edge/unregistered_type.vdb";
-  const auto summary = inspectVdb(path);
-  EXPECT_THAT(uniqueNames(summary), ElementsAre("velocity", "phi_obstacle", "phi_inflow", "phi_out",
-                                                "flags", "velocity_previous", "particles",
-                                                "phi_particles", "phi", "phi_previous"));
-  EXPECT_THAT(summary.grids[6].skipReason, HasSubstr("points"));
-  EXPECT_EQ(activeVoxelCount(readGrid(path, "phi").volume), 18432u);
 }
 
 TEST(EdgeFiles, AFrameOfASequenceListsEveryGridInFileOrder) {
@@ -356,12 +325,6 @@ TEST(EdgeFiles, AFrameOfASequenceListsEveryGridInFileOrder) {
   EXPECT_EQ(summary.grids[7].name, "density");
   EXPECT_EQ(summary.grids[7].activeVoxels, 19289u);
   EXPECT_THAT(summary.grids[10].skipReason, HasSubstr("no active voxel"));
-}
-
-TEST(EdgeFiles, HoudinisCreatorIsKept) {
-  ESVR_NEEDS_DATA();
-  const auto summary = inspectVdb(dataDir() / "smoke1.vdb");
-  EXPECT_THAT(summary.metadata, ElementsAre(stringItem("creator", "Houdini/SOP_OpenVDB_Write")));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include "vdb/open_vdb.h"
 
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>

@@ -7,7 +7,6 @@
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <span>
 #include <string_view>

@@ -442,33 +442,6 @@ TEST_F(Names, StandInFileOrder) {
   EXPECT_EQ(mark("ant"), 2.0f);
 }
 
-TEST_F(Names, SharedByGridsAreNumberedFromZero) {
-  test::save(path(), gridsNamed({"a", "b", "a", "a"}));
-  EXPECT_THAT(uniqueNames(), ElementsAre("a[0]", "b", "a[1]", "a[2]"));
-  EXPECT_THAT([&] { (void)mark("a"); }, test::ThrowsSaying<BadInput>("has 3 grids \"a\""));
-  EXPECT_EQ(mark("a[0]"), 1.0f);
-  EXPECT_EQ(mark("a[1]"), 3.0f);
-  EXPECT_EQ(mark("a[2]"), 4.0f);
-  EXPECT_EQ(mark("b[0]"), 2.0f);
-}
-
-TEST_F(Names, MayBeEmpty) {
-  test::save(path(), gridsNamed({""}));
-  EXPECT_THAT(uniqueNames(), ElementsAre("(unnamed)"));
-  EXPECT_EQ(mark(""), 1.0f);
-  EXPECT_EQ(mark("(unnamed)"), 1.0f);
-  test::save(path(), gridsNamed({"", "", "x"}));
-  EXPECT_THAT(uniqueNames(), ElementsAre("(unnamed)[0]", "(unnamed)[1]", "x"));
-  EXPECT_EQ(mark("[1]"), 2.0f);
-  EXPECT_EQ(readGrid(path(), "[1]").descriptor.name, "");
-}
-
-TEST_F(Names, MayLookNumbered) {
-  test::save(path(), gridsNamed({"a[1]", "b"}));
-  EXPECT_THAT(uniqueNames(), ElementsAre("a[1]", "b"));
-  EXPECT_EQ(mark("a[1]"), 1.0f);
-}
-
 /// OpenVDB's own look-up finds "a[1]" for the grid of this very name and for the second "a".
 TEST_F(Names, ThatLookNumberedWinAndNoGridIsTakenForAnother) {
   const std::vector<Order> orders{{{"a", "a", "a[1]"}, {"a[0]", "a#2", "a[1]"}},
@@ -499,13 +472,6 @@ TEST_F(Names, OfPlacesThatAreNotThereAreRefused) {
   test::save(path(), gridsNamed({"a", "b"}));
   EXPECT_THAT([&] { (void)readGrid(path(), std::size_t{2}); },
               test::ThrowsSaying<BadInput>("has no grid number 3, only 2 grids"));
-}
-
-TEST_F(Names, AreListedForAnUnknownName) {
-  test::save(path(), gridsNamed({"a", "b", "a"}));
-  for (const char* name : {"c", "a[2]", "b[1]", "", "A"})
-    EXPECT_THAT([&] { (void)readGrid(path(), name); },
-                test::ThrowsSaying<BadInput>("in.vdb", name, "\"a[0]\", \"b\", \"a[1]\""));
 }
 
 TEST_F(Names, OfAFileWithoutGridsAreNone) {

@@ -17,8 +17,8 @@ bl_info = {
 
 def _parts():
     """The modules that register something, in order. Tests of the other modules import this package without bpy."""
-    from . import import_export, modal, preferences, volumes, watch
-    return preferences, volumes, import_export, watch, modal
+    from . import import_export, modal, preferences, volumes
+    return preferences, volumes, import_export, modal
 
 
 def register():

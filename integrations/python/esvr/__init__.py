@@ -10,7 +10,7 @@
 All coordinates are those of the index space: voxel (i, j, k) lies at (i, j, k), and arrays have the axes
 x, y, z.
 """
-from . import _html, _openvdb, _xarray
+from . import _core, _html, _openvdb, _xarray
 from ._core import (BadInput, Cancelled, DeviceError, Ellipsoids, Error, File, Grid, GridBuilder,
                     MemoryExceeded, Metrics, PackedGrid, Sequence, TargetMissed, UsageError, Volume,
                      __version__, compare, convert, fit, frames, list_grids, read, read_splats, write,
@@ -28,3 +28,8 @@ Volume.to_pyopenvdb = _openvdb.grid_of
 Volume.from_xarray = staticmethod(_xarray.volume_of)
 Volume.to_xarray = _xarray.array_of
 Volume.to_masked = _xarray.masked_of
+
+
+def _restore(function, state):
+    """What pickle calls to make an object again."""
+    return getattr(_core, function)(state)

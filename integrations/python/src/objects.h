@@ -90,7 +90,7 @@ using Matrix = std::array<std::array<double, 4>, 4>;
 /// \throws UsageError  no class has the name
 [[nodiscard]] GridClass classFrom(const std::string& name);
 
-/// What repr() says of an object, in one line (describe.cpp).
+/// What repr() says of an object, in one line (properties.cpp).
 [[nodiscard]] std::string describe(const Volume& volume);
 [[nodiscard]] std::string describe(const Grid& grid);
 [[nodiscard]] std::string describe(const Packed& grid);

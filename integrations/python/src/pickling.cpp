@@ -317,7 +317,8 @@ Ellipsoids restoreEllipsoids(const py::tuple& state) {
   return e;
 }
 
-/// \param name     of a function in esvr/_restore.py, which calls the one of the module with an underscore before it
+/// \param name     of the function of the module, with an underscore before it, that esvr._restore() calls, because pickle
+///                 cannot name functions of the module
 /// \param restore  makes an object of what stateOf() gives
 template <class T>
 void addTo(py::module_& module, const std::string& name, T (*restore)(const py::tuple&)) {
@@ -327,8 +328,8 @@ void addTo(py::module_& module, const std::string& name, T (*restore)(const py::
     py::setattr(type, called, py::cpp_function(function, py::name(called), py::is_method(type)));
   };
   method("__reduce__", [name](const T& self) {
-    const py::object function = py::module_::import("esvr._restore").attr(name.c_str());
-    return py::make_tuple(function, py::make_tuple(stateOf(self)));
+    const py::object function = py::module_::import("esvr").attr("_restore");
+    return py::make_tuple(function, py::make_tuple("_" + name, stateOf(self)));
   });
   method("__copy__", [](const py::object& self) { return self; });
   method("__deepcopy__", [](const py::object& self, const py::object&) { return self; });

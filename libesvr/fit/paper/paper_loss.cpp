@@ -10,7 +10,6 @@
 
 #include "core/parallel.h"
 #include "esvr/error.h"
-#include "field/ssim_window.h"
 #include "fit/paper/ssim_math.h"
 
 namespace esvr {

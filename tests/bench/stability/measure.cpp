@@ -7,27 +7,33 @@
 // and fits with step sizes around those of fit().
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <fstream>
+#include <functional>
 #include <limits>
-#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "bench/stability/stability.h"
 #include "core/device_choice.h"
+#include "esvr/device.h"
+#include "esvr/ellipsoids.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
 #include "esvr/fit.h"
 #include "esvr/render.h"
+#include "esvr/volume.h"
 #include "fit/cpu/cpu_pass.h"
 #include "fit/ellipsoid.h"
+#include "fit/gradient_scene.h"
 #include "fit/run.h"
 #include "support/stability.h"
 
@@ -39,7 +45,332 @@
 namespace esvr::bench {
 namespace {
 
+// The cases.
+
+/// A fit of a volume.
+struct FitCase {
+  std::function<SparseVolume()> volume;
+  std::size_t count = 0;           ///< ellipsoids
+  std::optional<float> kappa{};    ///< of the kernel; nothing: it is fitted
+  std::function<Field()> start{};  ///< ellipsoids to begin with; empty: seeds
+  std::uint64_t chunkVoxels = 0;   ///< active voxels of a chunk; 0: one chunk
+};
+
+struct StabilityCase {
+  std::string name;                               ///< of the row
+  std::string detail;                             ///< what is measured, as sentences
+  std::function<Field()> field{};                 ///< is evaluated; empty: not measured
+  std::optional<test::GradientCase> gradients{};  ///< nothing: not measured
+  std::optional<FitCase> fit{};                   ///< nothing: not measured
+  /// Further ellipsoids at the same voxels, in the measurement of gradients.
+  std::size_t crowd = 0;
+};
+
+using test::randomField;
+using test::RandomFieldOptions;
+
+/// The value of a voxel.
+using ValueAt = std::function<float(Coord)>;
+
+/// A cube of bricks whose voxels are active where they differ from the background, 0.
+SparseVolume cubeOf(int bricks, const ValueAt& valueAt, Coord corner = {}) {
+  std::vector<BrickInput> inputs;
+  for (int n = 0; n < bricks * bricks * bricks; ++n) {
+    BrickInput brick{
+        .corner =
+            corner + Coord{n / (bricks * bricks), n / bricks % bricks, n % bricks} * kBrickSide,
+        .values = {},
+        .active = {}};
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const float value = valueAt(brick.corner - corner + voxelLocal(v));
+      brick.values[std::size_t(v)] = value;
+      if (value != 0.0f) brick.active.set(v);
+    }
+    inputs.push_back(brick);
+  }
+  return makeVolume(std::move(inputs), 0.0f);
+}
+
+/// The voxels of a field.
+std::function<SparseVolume()> voxelsOf(std::function<Field()> field, float threshold = 1e-4f) {
+  return [field = std::move(field), threshold] {
+    return revoxelise(field(), {.threshold = threshold});
+  };
+}
+
+struct Shape {
+  std::array<double, 3> scales;
+  std::array<float, 4> rotation{1.0f, 0.0f, 0.0f, 0.0f};
+};
+
+/// One ellipsoid of intensity 1 with this center in all coordinates.
+Field fieldOfOne(const Shape& shape, float center, float kappa = 2.0f) {
+  Field field = randomField({.count = 1, .kappa = kappa});
+  Ellipsoids& e = field.chunks[0].ellipsoids;
+  for (std::size_t a = 0; a < 3; ++a) {
+    e.center[a][0] = center;
+    e.logScale[a][0] = float(std::log(shape.scales[a]));
+  }
+  for (std::size_t a = 0; a < 4; ++a) e.rotation[a][0] = shape.rotation[a];
+  e.intensity[0] = 1.0f;
+  return field;
+}
+
+/// A field whose ellipsoids all have these scales.
+Field withScales(Field field, const std::array<double, 3>& scales) {
+  for (Chunk& chunk : field.chunks)
+    for (std::size_t a = 0; a < 3; ++a)
+      std::ranges::fill(chunk.ellipsoids.logScale[a], float(std::log(scales[a])));
+  return field;
+}
+
+/// The rotation from x to the diagonal of a cube.
+std::array<float, 4> towardsDiagonal() {
+  const double angle = std::acos(1.0 / std::sqrt(3.0)), s = std::sin(angle / 2.0) / std::sqrt(2.0);
+  return {float(std::cos(angle / 2.0)), 0.0f, float(-s), float(s)};
+}
+
+/// Ellipsoids of ordinary shapes with random intensities of one sign or both.
+RandomFieldOptions usual(float kappa = 2.0f) {
+  return {.count = 60, .extent = 40.0, .smallest = 1.5, .kappa = kappa};
+}
+
+std::vector<StabilityCase> shapes() {
+  const std::array<double, 3> needle{100.0, 0.1, 0.1}, disc{100.0, 100.0, 0.1};
+  return {
+      {"needles 1:1000",
+       "Scales of 100, 0.1 and 0.1 voxels in random directions. The fit is of a needle along the "
+       "diagonal with scales of 300, 0.3 and 0.3 voxels.",
+       [=] { return withScales(randomField({.count = 30, .extent = 24.0}), needle); },
+       test::GradientCase{"needle", {100.0, 0.1, 0.1}, 2.0f},
+       FitCase{voxelsOf([] {
+                 return fieldOfOne({{300.0, 0.3, 0.3}, towardsDiagonal()}, 0.0f);
+               }),
+               600}},
+      {"discs 1:1000",
+       "Scales of 100, 100 and 0.1 voxels in random directions. The fit is of one layer of "
+       "voxels: a disc with scales of 50, 50 and 0.05 voxels in the plane of an axis.",
+       [=] { return withScales(randomField({.count = 30, .extent = 24.0}), disc); },
+       test::GradientCase{"pancake", {100.0, 100.0, 0.1}, 2.0f},
+       FitCase{voxelsOf([] {
+                 return fieldOfOne({{50.0, 50.0, 0.05}}, 0.0f);
+               }),
+               600}},
+      {"scales of 0.1 voxels",
+       "Spheres with a scale of 0.1 voxels, whose support is smaller than a voxel. The fit is of "
+       "216 single voxels far from each other.",
+       [] {
+         return withScales(randomField({.count = 4000, .extent = 24.0}), {0.1, 0.1, 0.1});
+       },
+       test::GradientCase{"subvoxel", {0.1, 0.1, 0.1}, 2.0f},
+       FitCase{[] {
+                 return cubeOf(6, [](Coord c) {
+                   return c.x % 8 == 3 && c.y % 8 == 3 && c.z % 8 == 3 ? 1.0f : 0.0f;
+                 });
+               },
+               216}},
+      {"scales of 300 voxels",
+       "Spheres with a scale of 300 voxels. The fit is of a cube of 40^3 voxels on the flank of "
+       "one, which ends sharply at its sides.",
+       [] {
+         return withScales(randomField({.count = 20, .extent = 40.0}), {300.0, 300.0, 300.0});
+       },
+       test::GradientCase{"vast", {300.0, 300.0, 300.0}, 2.0f},
+       FitCase{[] {
+                 return cubeOf(5, [](Coord c) {
+                   const double m = (std::pow(c.x + 400.0, 2) + c.y * c.y + c.z * c.z) / 9e4;
+                   return float(std::exp(-m));
+                 });
+               },
+               300}}};
+}
+
+std::vector<StabilityCase> kernels() {
+  std::vector<StabilityCase> cases;
+  for (const float kappa : {-30.0f, -3.0f, 0.0f, 5.0f, 30.0f}) {
+    const auto field = [kappa] { return randomField(usual(kappa)); };
+    cases.push_back(
+        {"kappa " + std::to_string(int(kappa)),
+         "Ordinary shapes with this edge. The fit keeps the edge, and is of the voxels of the "
+         "same ellipsoids.",
+         field, test::GradientCase{"usual", {2.0, 1.0, 0.6}, kappa},
+         FitCase{voxelsOf(field), 300, kappa}});
+  }
+  return cases;
+}
+
+std::vector<StabilityCase> sharpnesses() {
+  std::vector<StabilityCase> cases;
+  for (const float k : {0.5f, 5.0f, 50.0f, 500.0f, 5000.0f}) {
+    // The paper's scales are sqrt(k) times ours, so that the ellipsoids are as large for any k.
+    const double s = 1.0 / std::sqrt(double(k));
+    const auto field = [=] {
+      Field paper = withScales(randomField(usual(k)), {6.0 * s, 4.0 * s, 3.0 * s});
+      paper.kernel.form = KernelForm::kPaper;
+      return paper;
+    };
+    cases.push_back({"k = " + (k < 1.0f ? std::string("0.5") : std::to_string(int(k))),
+                     "The paper's kernel of this sharpness with its scales of 6, 4 and 3 voxels. "
+                     "Gradients and fit are those of the continuous kernel with the same edge, "
+                     "and the fit is of a smooth volume.",
+                     field, test::GradientCase{"paper", {6.0 * s, 4.0 * s, 3.0 * s}, k},
+                     FitCase{voxelsOf([] { return randomField(usual()); }), 300, k}});
+  }
+  return cases;
+}
+
+std::vector<StabilityCase> magnitudes() {
+  std::vector<StabilityCase> cases;
+  for (const auto& [name, factor] : {std::pair{"1e-30", 1e-30}, {"1e30", 1e30}}) {
+    const auto field = [factor = factor] {
+      RandomFieldOptions o = usual();
+      o.intensity = factor;
+      return randomField(o);
+    };
+    cases.push_back(
+        {std::string("intensities of ") + name,
+         "Ordinary shapes with intensities of this magnitude. A fit scales its target by a power "
+         "of two, so gradients are those of any other magnitude.",
+         field, std::nullopt, FitCase{voxelsOf(field, float(1e-4 * factor)), 300}});
+  }
+  const auto denormal = [] {
+    RandomFieldOptions o = usual();
+    o.intensity = 1e-40;
+    return randomField(o);
+  };
+  cases.push_back(
+      {"denormals",
+       "Intensities of 1e-40, below the normal numbers of float32. The peak has 16 bits, so that "
+       "the precision of a value is 1.4e-5 of the peak.",
+       denormal, std::nullopt, FitCase{voxelsOf(denormal, 0.0f), 300}});
+  const auto cancelling = [] {
+    Field field = randomField(usual());
+    Ellipsoids& e = field.chunks[0].ellipsoids;
+    Ellipsoids twice = e;
+    twice.resize(2 * e.size());
+    const auto copy = [&](auto& from, auto& to, float factor) {
+      std::ranges::copy(from, to.begin());
+      std::ranges::transform(from, to.begin() + std::ptrdiff_t(from.size()),
+                             [&](float value) { return factor * value; });
+    };
+    for (std::size_t a = 0; a < 3; ++a) {
+      copy(e.center[a], twice.center[a], 1.0f);
+      copy(e.logScale[a], twice.logScale[a], 1.0f);
+    }
+    for (std::size_t a = 0; a < 4; ++a) copy(e.rotation[a], twice.rotation[a], 1.0f);
+    copy(e.intensity, twice.intensity, -0.999f);
+    field.chunks[0].ellipsoids = twice;
+    return field;
+  };
+  cases.push_back(
+      {"signed data that cancel",
+       "Pairs of ellipsoids of both signs whose sum is a thousandth of each. Gradients and "
+       "fit are of signed data: ordinary shapes of both signs.",
+       cancelling, test::GradientCase{"usual", {2.0, 1.0, 0.6}, 2.0f},
+       FitCase{voxelsOf([] { return randomField(usual()); }), 300}});
+  return cases;
+}
+
+/// Ten thousand ellipsoids of both signs within one voxel.
+Field crowd() {
+  return randomField({.count = 10000, .extent = 1.0, .smallest = 1.0, .intensity = 0.01});
+}
+
+std::vector<StabilityCase> places() {
+  std::vector<StabilityCase> cases{
+      {"ten thousand over one voxel",
+       "10,000 ellipsoids of both signs whose centers lie within one voxel. Gradients are those of "
+       "four ellipsoids among 10,000 in 16^3 voxels. The fit begins with the ellipsoids over one "
+       "voxel, and is of a ball with a radius of 12 voxels.",
+       crowd, test::GradientCase{"usual", {2.0, 1.0, 0.6}, 2.0f},
+       FitCase{[] {
+                 return cubeOf(4, [](Coord c) {
+                   const double r = std::hypot(c.x - 15.0, c.y - 15.0, c.z - 15.0);
+                   return float(std::max(0.0, 1.0 - r * r / 144.0));
+                 });
+               },
+               10000, 2.0f,
+               [] {
+                 Field field = crowd();
+                 for (auto& center : field.chunks[0].ellipsoids.center)
+                   for (float& c : center) c += 15.0f;
+                 return field;
+               }}},
+      {"coordinates of +-1e7",
+       "Ordinary shapes ten million voxels from the origin, on both sides. Centers are relative "
+       "to a chunk, and a fit is relative to the volume, so gradients are those of any other "
+       "place.",
+       [] {
+         RandomFieldOptions o = usual();
+         o.origin = {10'000'000, -10'000'000, 10'000'000};
+         return randomField(o);
+       },
+       std::nullopt,
+       FitCase{voxelsOf([] {
+                 RandomFieldOptions o = usual();
+                 o.origin = {10'000'000, -10'000'000, 10'000'000};
+                 return randomField(o);
+               }),
+               300}},
+      {"chunk seams",
+       "Ellipsoids on both sides of a border of chunks of coordinates (4096 voxels), to which "
+       "their centers are relative. The fit is in chunks of 20,000 voxels, whose borders cut the "
+       "ellipsoids.",
+       [] {
+         RandomFieldOptions o = usual();
+         o.origin = {-20, 0, 0};
+         Field field = randomField(o);
+         o.origin = {kChunkExtent - 20, 0, 0};
+         o.seed = 11;
+         // Centers near 4096 in the first chunk meet those near 0 in the second one.
+         for (float& x : field.chunks[0].ellipsoids.center[0]) x += float(kChunkExtent);
+         field.chunks.push_back(randomField(o).chunks[0]);
+         return field;
+       },
+       std::nullopt, FitCase{voxelsOf([] { return randomField(usual()); }), 300, {}, {}, 20000}}};
+  cases.front().crowd = 10000;
+  return cases;
+}
+
+std::vector<StabilityCase> values() {
+  return {{"a constant",
+           "A cube of 24^3 voxels of the value 1.",
+           {},
+           std::nullopt,
+           FitCase{[] { return cubeOf(3, [](Coord) { return 1.0f; }); }, 200}},
+          {"a single voxel",
+           "One voxel of the value 1.",
+           {},
+           std::nullopt,
+           FitCase{[] {
+                     return cubeOf(1, [](Coord c) { return c == Coord{3, 4, 5} ? 1.0f : 0.0f; });
+                   },
+                   1}},
+          {"a checkerboard",
+           "A cube of 16^3 voxels, every other one of the value 1. It is the worst case of "
+           "smooth primitives: only an ellipsoid for each voxel of value 1 is precise.",
+           {},
+           std::nullopt,
+           FitCase{[] { return cubeOf(2, [](Coord c) { return float((c.x + c.y + c.z) & 1); }); },
+                   512}}};
+}
+
+std::vector<StabilityCase> stabilityCases() {
+  std::vector<StabilityCase> all;
+  for (auto* part : {shapes, kernels, sharpnesses, magnitudes, places, values})
+    for (StabilityCase& c : part()) all.push_back(std::move(c));
+  return all;
+}
+
 // Gradients.
+
+struct GradientErrors {
+  /// Largest error of a derivative, divided by the sum of the magnitudes of the terms of the largest
+  /// derivative of its ellipsoid.
+  double largest = 0.0;
+  double bound = 0.0;         ///< the largest that the arithmetic allows
+  double shareOfBound = 0.0;  ///< largest error divided by its own bound
+};
 
 std::vector<EllipsoidGradient> gradientsOnCpu(const FitTarget& target, const Kernel& kernel,
                                               std::span<const Ellipsoid> ellipsoids) {
@@ -94,8 +425,8 @@ std::vector<EllipsoidGradient> gradientsOnGpu(const FitTarget&, const Kernel&,
 }
 #endif
 
-}  // namespace
-
+/// Measures the gradients of four ellipsoids.
+/// \param crowd  ellipsoids of the same shapes that are added to the sum, as faint as they are many
 GradientErrors measureGradients(const test::GradientCase& c, std::size_t crowd,
                                 const Device& device) {
   const test::SmallTarget target;
@@ -117,9 +448,29 @@ GradientErrors measureGradients(const test::GradientCase& c, std::size_t crowd,
   return errors;
 }
 
-namespace {
-
 // Fits.
+
+/// A fit whose step sizes are a multiple of the tuned ones.
+struct FitRun {
+  double factor = 1.0;
+  double psnr = 0.0;          ///< dB over the box at the end
+  double largestError = 0.0;  ///< as a share of the peak
+  std::uint32_t iterations = 0;
+  std::size_t ellipsoids = 0;
+  bool finite = true;     ///< whether all parameters and errors are finite
+  std::string failure{};  ///< why the fit ended early; empty if it did not
+  std::vector<TimedCurvePoint> curve{};
+};
+
+struct FitFigures {
+  std::uint64_t activeVoxels = 0;
+  double psnrOfNothing = 0.0;          ///< dB, without an ellipsoid
+  std::optional<FitRun> inOneChunk{};  ///< of a case in chunks: the same fit in one chunk
+  std::vector<FitRun> runs;            ///< by increasing factors
+};
+
+/// The factors by which step sizes are multiplied: around 1, and beyond for the margin.
+inline constexpr double kFactors[] = {0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0};
 
 bool isFinite(const Ellipsoid& p) {
   const auto finite = [](double v) { return std::isfinite(v); };
@@ -220,19 +571,8 @@ class Fits {
   FitTarget target_;
 };
 
-}  // namespace
+// The program.
 
-FitFigures measureFits(const FitCase& fitCase, const Device& device, std::uint32_t iterations) {
-  return Fits(fitCase, device, iterations).measure();
-}
-
-}  // namespace esvr::bench
-
-// ---- The program
-
-namespace {
-
-using namespace esvr;
 using Json = nlohmann::ordered_json;
 
 constexpr std::uint32_t kIterations = 400;
@@ -244,29 +584,31 @@ struct Options {
 
 Json finiteOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
+/// The number of leading decimal digits that a difference leaves correct: the largest whole d with difference <= 10^-d
+/// peak, at most 17, which stands for no difference.
+int correctDigits(double difference, double peak) {
+  constexpr int kMost = std::numeric_limits<double>::max_digits10;
+  if (difference == 0.0) return kMost;
+  const double share = difference / peak;
+  return share < 1.0 ? std::min(kMost, int(std::floor(-std::log10(share)))) : 0;
+}
+
 Json evaluation(const Field& field, const Device& device) {
-  test::StabilityOptions options;
-  options.samples = 512;
-  options.evaluate = [&](const Field& f, std::span<const Coord> corners, std::span<float> out) {
-    test::evaluateBricksOn(device, f, corners, out);
-  };
-  options.arithmetic = test::arithmeticOf(device);
-  const test::Stability s = test::measureStability(field, options);
-  const Coord at = s.worst.front().at;
+  const test::Stability s = test::measureStability(field, {.samples = 512, .device = device});
   return {{"max", finiteOrNull(s.largest)},
           {"rms", finiteOrNull(s.rms)},
           {"bound", s.bound},
           {"share_of_bound", finiteOrNull(s.shareOfBound)},
           {"peak", s.peak},
-          {"digits", test::correctDigits(s.largest, s.peak)},
-          {"at", {at.x, at.y, at.z}},
+          {"digits", correctDigits(s.largest, s.peak)},
+          {"at", {s.at.x, s.at.y, s.at.z}},
           {"overlap", s.largestOverlap},
-          {"cancellation", s.meanCancellation},
-          {"condition", s.extremes.largestCondition}};
+          {"cancellation", s.cancellation},
+          {"condition", s.largestCondition}};
 }
 
-Json gradients(const bench::StabilityCase& c, const Device& device) {
-  const bench::GradientErrors errors = bench::measureGradients(*c.gradients, c.crowd, device);
+Json gradients(const StabilityCase& c, const Device& device) {
+  const GradientErrors errors = measureGradients(*c.gradients, c.crowd, device);
   return {{"max", finiteOrNull(errors.largest)},
           {"bound", errors.bound},
           {"share_of_bound", finiteOrNull(errors.shareOfBound)}};
@@ -276,7 +618,7 @@ Json gradients(const bench::StabilityCase& c, const Device& device) {
 double rounded(double value, double perUnit) { return std::round(value * perUnit) / perUnit; }
 
 /// The curves that the page shows; those of the other factors are only needed at their ends.
-Json curveOf(const bench::FitRun& run) {
+Json curveOf(const FitRun& run) {
   constexpr double kLargestFactor = 2.0;
   Json curve = Json::array();
   if (run.factor > kLargestFactor) return curve;
@@ -285,7 +627,7 @@ Json curveOf(const bench::FitRun& run) {
   return curve;
 }
 
-Json toJson(const bench::FitRun& run) {
+Json toJson(const FitRun& run) {
   return {{"factor", run.factor},
           {"psnr", finiteOrNull(run.psnr)},
           {"max_error", finiteOrNull(run.largestError)},
@@ -296,17 +638,17 @@ Json toJson(const bench::FitRun& run) {
           {"curve", curveOf(run)}};
 }
 
-Json fits(const bench::FitCase& c, const Device& device, std::uint32_t iterations) {
-  const bench::FitFigures figures = bench::measureFits(c, device, iterations);
+Json fits(const FitCase& c, const Device& device, std::uint32_t iterations) {
+  const FitFigures figures = Fits(c, device, iterations).measure();
   Json runs = Json::array();
-  for (const bench::FitRun& run : figures.runs) runs.push_back(toJson(run));
+  for (const FitRun& run : figures.runs) runs.push_back(toJson(run));
   return {{"active_voxels", figures.activeVoxels},
           {"psnr_of_nothing", finiteOrNull(figures.psnrOfNothing)},
           {"in_one_chunk", figures.inOneChunk ? toJson(*figures.inOneChunk) : Json(nullptr)},
           {"runs", std::move(runs)}};
 }
 
-Json measured(const bench::StabilityCase& c, const Device& device, const Options& options) {
+Json measured(const StabilityCase& c, const Device& device, const Options& options) {
   return {{"name", c.name},
           {"detail", c.detail},
           {"evaluation", c.field ? evaluation(c.field(), device) : Json(nullptr)},
@@ -344,7 +686,7 @@ void run(const Options& options) {
   out << "{\"device\": " << Json(deviceName(device)) << ", \"machine\": " << Json(options.machine)
       << ", \"iterations\": " << options.iterations << ", \"cases\": [";
   const char* separator = "\n";
-  for (const bench::StabilityCase& c : bench::stabilityCases()) {
+  for (const StabilityCase& c : stabilityCases()) {
     if (c.name.find(options.only) == std::string::npos) continue;
     std::fprintf(stderr, "%s\n", c.name.c_str());
     out << std::exchange(separator, ",\n") << measured(c, device, options);
@@ -354,9 +696,10 @@ void run(const Options& options) {
 }
 
 }  // namespace
+}  // namespace esvr::bench
 
 int main(int argc, char** argv) try {
-  run(parse({argv + 1, argv + argc}));
+  esvr::bench::run(esvr::bench::parse({argv + 1, argv + argc}));
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "bench_stability: %s\n", error.what());

@@ -10,7 +10,7 @@ import shutil
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-TESTS = {"modules": ["test_modules.py", "test_decode.py", "test_export.py"],
+TESTS = {"modules": ["test_modules.py", "test_decode_and_export.py"],
          "blender": ["test_addon.py"]}
 
 

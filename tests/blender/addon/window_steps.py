@@ -19,11 +19,11 @@ bpy.ops.preferences.addon_enable(module=ADDON)
 preferences = bpy.context.preferences.addons[ADDON].preferences
 for name, value in arguments["preferences"].items():
     setattr(preferences, name, value)
-from esvr_blender import modal, watch  # noqa: E402 (enabling the add-on makes them known)
+from esvr_blender import modal, volumes  # noqa: E402 (enabling the add-on makes them known)
 
 result = {}
 errors = []  # that are shown in a window
-show_error = watch.show_error
+show_error = volumes.show_error
 
 
 def noted_error(text):
@@ -31,7 +31,7 @@ def noted_error(text):
     show_error(text)
 
 
-watch.show_error = noted_error
+volumes.show_error = noted_error
 
 
 def window():

@@ -4,7 +4,7 @@
 // ellipsoids in one brick. For the shapes and kernels of the CPU's tests (gradient_test.cpp), the
 // gradients are compared with float64 differences and the adjoint identity.
 //
-// The tests of intensity_cases.h run on a GPU. Passes over many overlapping ellipsoids agree
+// The tests of device_cases.h run on a GPU. Passes over many overlapping ellipsoids agree
 // with those of the CPU, and have the same bits in every run.
 
 #include <algorithm>
@@ -15,9 +15,8 @@
 #include "fit/cpu/cpu_pass.h"
 #include "fit/cuda/cuda_optimiser.h"
 #include "fit/cuda/gpu_test.h"
-#include "fit/gradient_cases.h"
+#include "fit/device_cases.h"
 #include "fit/gradient_scene.h"
-#include "fit/intensity_cases.h"
 #include "fit/volumes.h"
 
 namespace esvr {

@@ -1,7 +1,6 @@
 #include "fit/paper/paper_loss_scene.h"
 
 #include <array>
-#include <cmath>
 
 namespace esvr::test {
 namespace {

@@ -265,17 +265,7 @@ TEST_F(BricksOnGpu, DrawInBandsWhereMemoryIsShort) {
 
 // Given bricks.
 
-class DeviceBricks : public OnDevice {
- protected:
-  [[nodiscard]] Stability measured(const Field& field) const {
-    StabilityOptions options;
-    options.evaluate = [&](const Field& f, std::span<const Coord> corners, std::span<float> out) {
-      evaluateBricksOn(device_, f, corners, out);
-    };
-    options.arithmetic = arithmeticOf(device_);
-    return measureStability(field, options);
-  }
-};
+class DeviceBricks : public OnDevice {};
 
 TEST_P(DeviceBricks, StayWithinTheBoundOfTheirArithmetic) {
   for (const RandomFieldOptions& shape : std::initializer_list<RandomFieldOptions>{
@@ -287,7 +277,7 @@ TEST_P(DeviceBricks, StayWithinTheBoundOfTheirArithmetic) {
            {.intensity = 1e-30},
            {.intensity = 1e30},
            {.origin = {10'000'000, -10'000'000, 10'000'000}}}) {
-    const Stability s = measured(randomField(shape));
+    const Stability s = measureStability(randomField(shape), {.device = device_});
     EXPECT_GT(s.largest, 0.0) << "no rounding at all proves nothing";
     EXPECT_LT(s.shareOfBound, 1.0) << "kappa " << shape.kappa << ", aspect " << shape.aspect;
   }

@@ -1,5 +1,5 @@
 /**
- * The library's decoder as WebAssembly (libesvr/page/page.h): files, volumes and the tables of drawing.
+ * The library's decoder as WebAssembly (libesvr/page/page.cpp): files, volumes and the tables of drawing.
  * @typedef {import("../types.js").Triple} Triple
  * @typedef {import("../types.js").Transfer} Transfer
  * @typedef {import("../types.js").Camera} Camera

@@ -1,6 +1,4 @@
-// The parts of reports, and the forms of a table: text, Markdown, JSON, CSV and a page.
-
-#include "compare/report_parts.h"
+// The forms of a table: text, Markdown, JSON, CSV and a page.
 
 #include <algorithm>
 #include <cmath>
@@ -9,33 +7,65 @@
 #include <span>
 
 #include "compare/figures.h"
-#include "compare/finding.h"
-#include "compare/options.h"
 #include "compare/table.h"
 #include "compare/table_record.h"
-#include "programs/data_table.h"
+#include "esvr/baseline.h"
 #include "programs/files.h"
 #include "programs/page_figures.h"
 #include "programs/run_main.h"
 
 namespace esvr::compare {
+namespace {
 
 using report::Cell;
 using report::Chart;
 using report::DataTable;
+using report::Emphasis;
 using report::FigureTable;
 using report::Html;
 using report::Kind;
 using report::Series;
+using Json = nlohmann::ordered_json;
+
+// What made the table.
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const auto& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+/// One line for the program, the format and each library.
+std::vector<std::string> versionLines() {
+  std::vector<std::string> lines;
+  std::string text = cli::versionText(kProgram);
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    lines.push_back(text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  if (!zfpVersion().empty()) lines.push_back(zfpVersion());
+  return lines;
+}
+
+/// The versions that reports of all programs have, and that of ZFP; null if there is none.
+Json versionJson() {
+  Json versions = cli::versionJson();
+  versions["zfp"] = nullptr;
+  if (!zfpVersion().empty()) versions["zfp"] = zfpVersion();
+  return versions;
+}
 
 // Sentences.
 
+/// The grid, its voxels, the box and the peak.
 std::string sceneLine(const TableRecord& record) {
   return "grid \"" + record.grid + "\", " + cli::counted(record.activeVoxels, "active voxel") +
          ", box " + toString(record.box.min) + " to " + toString(record.box.max) + ", peak " +
          cli::shortNumber(record.peak);
 }
 
+/// The device that drew the pictures and the cost of the reference's; empty without pictures.
 std::string pictureLine(const TableRecord& record) {
   if (!record.referenceCost) return {};
   const ImageFigures& cost = *record.referenceCost;
@@ -47,6 +77,7 @@ std::string pictureLine(const TableRecord& record) {
   return text + ".";
 }
 
+/// Which rows are rivals (Duel).
 std::string rivalRule() {
   constexpr double kPercent = 100.0;
   return "The best rival is the row with the highest PSNR over the box among all rows that are not "
@@ -54,13 +85,22 @@ std::string rivalRule() {
          cli::shortNumber(kPercent * kSameSize) + " % larger than the file of ESVR.";
 }
 
+/// Whether rows are missing; empty if not.
 std::string interruption(const TableRecord& record) {
   return record.interrupted ? "Interrupted: rows are missing." : "";
 }
 
 // Columns.
 
-namespace {
+/// Which figures are better.
+enum class Better { kNeither, kLess, kMore };
+
+/// A column and the function that gets its figure from a row.
+struct TableColumn {
+  report::Column column;
+  Cell (*of)(const TableRow&, const TableRecord&);
+  Better better = Better::kNeither;
+};
 
 template <auto Member>
 Cell metric(const TableRow& row, const TableRecord&) {
@@ -109,8 +149,6 @@ Cell memory(const TableRow& row, const TableRecord&) { return countOf(row.memory
 Cell deviceMemory(const TableRow& row, const TableRecord&) {
   return row.images ? countOf(row.images->deviceBytes) : Cell();
 }
-
-}  // namespace
 
 const std::vector<TableColumn>& tableColumns() {
   using R = TableRow;
@@ -195,12 +233,15 @@ const std::vector<TableColumn>& tableColumns() {
   return columns;
 }
 
+/// Whether a figure of a column is better than another one. Figures that look the same are equally
+/// good.
 bool isBetter(const TableColumn& column, const Cell& cell, const Cell& than) {
   const auto *a = std::get_if<double>(&cell), *b = std::get_if<double>(&than);
   if (!a || !b || cellText(column.column, cell) == cellText(column.column, than)) return false;
   return column.better == Better::kLess ? *a < *b : column.better == Better::kMore && *a > *b;
 }
 
+/// Whether the figures of a column say only how large a file is.
 bool isSize(const TableColumn& column) {
   return column.column.key == "bytes" || column.column.key == "ratio";
 }
@@ -218,19 +259,7 @@ DataTable dataTable(const TableRecord& record, std::span<const TableRow> rows) {
   return table;
 }
 
-void addCell(const report::Column& column, const Cell& cell, nlohmann::ordered_json& json) {
-  if (const auto* text = std::get_if<std::string>(&cell)) json[column.key] = *text;
-  if (const auto* value = std::get_if<double>(&cell)) json[column.key] = finiteOrNull(*value);
-}
-
-report::HtmlPage pageOf(const TableOptions& options, const TableRecord& record) {
-  report::HtmlPage page{.title = options.reference.filename().string(),
-                        .finding = findingOf(record),
-                        .commands = versionLines()};
-  page.commands.insert(page.commands.begin(), joined(options.commandLine));
-  return page;
-}
-
+/// The columns for which at least one row has a figure.
 DataTable withoutEmptyColumns(const DataTable& table) {
   std::vector<std::string> keys;
   for (std::size_t c = 0; c < table.columns.size(); ++c)
@@ -243,8 +272,6 @@ DataTable withoutEmptyColumns(const DataTable& table) {
 }
 
 // Duels.
-
-namespace {
 
 /// The figures of a duel, one in a line. Sizes say something only where both have no error.
 Html duelTable(const Duel& duel, const TableRecord& record) {
@@ -290,8 +317,8 @@ Html duelsTable(const std::vector<Duel>& duels) {
   return report::toHtml(figures);
 }
 
-}  // namespace
-
+/// A section with all figures of one duel, or with the PSNR of several; nothing if no row has a
+/// rival.
 Html duelSection(const std::vector<Duel>& duels, const TableRecord& record) {
   const auto hasRival = [](const Duel& duel) { return duel.rival != nullptr; };
   if (std::none_of(duels.begin(), duels.end(), hasRival)) return {};
@@ -302,13 +329,21 @@ Html duelSection(const std::vector<Duel>& duels, const TableRecord& record) {
 
 // Charts.
 
-namespace {
-
+/// A chart of errors on logarithmic axes, without series. Its axis has the root mean square error over the
+/// box as a share of the peak, and PSNR as a second scale.
 Chart errorChart(const std::string& title, const report::ChartAxis& x) {
   return {.title = title,
           .x = x,
           .y = {"RMS error over the box, % of the peak", report::Unit::kPercent, true},
           .decibels = true};
+}
+
+/// A point of such a chart. Where there is no error, the point is not shown.
+/// \param note  what to say about the point besides its values
+report::Point errorPoint(double x, double psnr, const std::string& note = {}) {
+  constexpr double kPercent = 100.0;
+  return {x, kPercent * std::pow(10.0, -psnr / 20.0),
+          cli::decibels(psnr) + " dB" + (note.empty() ? "" : "\n" + note)};
 }
 
 Series& seriesNamed(const std::string& name, Chart& chart) {
@@ -319,43 +354,39 @@ Series& seriesNamed(const std::string& name, Chart& chart) {
   return chart.series.back();
 }
 
-}  // namespace
-
-Chart errorOverBytes(const std::string& title) {
-  return errorChart(title, {"size of the file", report::Unit::kBytes, true});
-}
-
-Chart errorOverSeconds(const std::string& title) {
-  return errorChart(title, {"run time", report::Unit::kSeconds, true});
-}
-
-report::Point errorPoint(double x, double psnr, const std::string& note) {
-  constexpr double kPercent = 100.0;
-  return {x, kPercent * std::pow(10.0, -psnr / 20.0),
-          cli::decibels(psnr) + " dB" + (note.empty() ? "" : "\n" + note)};
-}
-
+/// The families of all rows (ESVR, OpenVDB, NanoVDB, ZFP, ...) over the size of their files.
 Chart familiesOverBytes(const TableRecord& record) {
-  Chart chart = errorOverBytes("All rows but those without an error");
+  Chart chart = errorChart("All rows but those without an error",
+                           {"size of the file", report::Unit::kBytes, true});
   for (const auto& row : record.rows) {
     if (!row.bytes || !row.metrics) continue;
     // A family has the first word of its rows' names: OpenVDB, NanoVDB, ZFP.
     const bool isOurs = row.group == kOurGroup;
     Series& series =
         seriesNamed(isOurs ? kOurGroup : row.name.substr(0, row.name.find(' ')), chart);
-    if (isOurs) series.emphasis = report::Emphasis::kOurs;
+    if (isOurs) series.emphasis = Emphasis::kOurs;
     series.points.push_back(errorPoint(double(*row.bytes), row.metrics->psnrBox, row.name));
   }
   return chart;
 }
 
-// ---- The report of a table
-
-using report::Emphasis;
+/// The curves of the fits that the command has made, and a curve through the times from the voxels to the file.
+Chart fitsOverSeconds(const TableRecord& record) {
+  Chart chart = errorChart("Fits of this command", {"run time", report::Unit::kSeconds, true});
+  Series ends{.name = "end to end", .emphasis = Emphasis::kOurs};
+  for (const auto& row : record.rows) {
+    if (row.curve.empty() || !row.metrics) continue;
+    Series series{.name = row.name};
+    for (const auto& at : row.curve) series.points.push_back(errorPoint(at.seconds, at.psnrBox));
+    chart.series.push_back(std::move(series));
+    ends.points.push_back(errorPoint(row.encode->median, row.metrics->psnrBox,
+                                     report::bytesText(double(*row.bytes))));
+  }
+  if (!ends.points.empty()) chart.series.insert(chart.series.begin(), std::move(ends));
+  return chart;
+}
 
 // Text and Markdown.
-
-namespace {
 
 const std::vector<std::string> kQuality{"name",        "bytes",     "ratio",     "psnr_box",
                                         "psnr_active", "psnr_t50",  "max_error", "p999_error",
@@ -441,13 +472,7 @@ std::string markdown(const TableOptions& options, const TableRecord& record) {
   return text;
 }
 
-}  // namespace
-
 // JSON.
-
-namespace {
-
-using Json = nlohmann::ordered_json;
 
 constexpr const char* kTableSchema = "esvr-table";
 constexpr int kTableVersion = 1;
@@ -472,7 +497,12 @@ Json searchJson(const TableRow& row) {
 
 Json rowJson(const TableRow& row, const TableRecord& record) {
   Json json = Json::object();
-  for (const auto& column : tableColumns()) addCell(column.column, column.of(row, record), json);
+  for (const auto& column : tableColumns()) {
+    const Cell cell = column.of(row, record);
+    if (const auto* text = std::get_if<std::string>(&cell)) json[column.column.key] = *text;
+    if (const auto* value = std::get_if<double>(&cell))
+      json[column.column.key] = finiteOrNull(*value);
+  }
   if (row.memory) json["memory_bytes"] = *row.memory;
   if (row.bytes) json["bytes"] = *row.bytes;
   if (row.images && row.images->deviceBytes) json["device_bytes"] = *row.images->deviceBytes;
@@ -510,11 +540,7 @@ Json tableJson(const TableOptions& options, const TableRecord& record) {
           {"rows", std::move(rows)}};
 }
 
-}  // namespace
-
 // The page.
-
-namespace {
 
 /// Columns whose figures are folded below their row.
 const std::vector<std::string> kFolded{
@@ -563,6 +589,8 @@ Html allRows(const TableRecord& record, const PageOrder& order) {
 Html overview(const TableRecord& record, const PageOrder& order) {
   Html content = duelSection(order.duels(), record);
   content += report::section("", "Error over size", report::toHtml(familiesOverBytes(record)));
+  if (const Chart fits = fitsOverSeconds(record); !fits.series.empty())
+    content += report::section("", "Error over run time", report::toHtml(fits));
   return report::element("div", {{"class", "overview"}}, content);
 }
 
@@ -597,7 +625,10 @@ Html pictures(const TableRecord& record, const PageOrder& order) {
 /// with their best rivals.
 std::string tablePage(const TableOptions& options, const TableRecord& record) {
   const PageOrder order(record);
-  report::HtmlPage page = pageOf(options, record);
+  report::HtmlPage page{.title = options.reference.filename().string(),
+                        .finding = findingOf(record),
+                        .commands = versionLines()};
+  page.commands.insert(page.commands.begin(), joined(options.commandLine));
   page.paragraphs = {sceneLine(record) + ".", order.duels().empty() ? "" : rivalRule(),
                      pictureLine(record), interruption(record)};
   page.sections = {overview(record, order), allRows(record, order)};
@@ -606,11 +637,7 @@ std::string tablePage(const TableOptions& options, const TableRecord& record) {
   return report::toHtml(page);
 }
 
-}  // namespace
-
 // Files.
-
-namespace {
 
 void writeText(const std::string& path, const std::string& text, bool overwrite) {
   if (!path.empty()) cli::writeBytes(path, std::as_bytes(std::span(text)), overwrite);

@@ -1,19 +1,63 @@
 #pragma once
-/// Plan for each device: the solution agrees with that of dense normal equations in float64, exact
-/// data is recovered, errors are those of a reader, voxels that a reader gets exactly are left out,
-/// and nothing depends on the field before.
+/// Tests for each device: the comparisons that gradients must pass, for the ellipsoids of gradient_scene.h; and the solution
+/// of intensities, which agrees with that of dense normal equations in float64. Exact data is recovered, errors are those of
+/// a reader, voxels that a reader gets exactly are left out, and nothing depends on the field before.
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "esvr/field.h"
 #include "esvr/metrics.h"
+#include "fit/gradient_scene.h"
 #include "fit/intensity_problem.h"
 #include "fit/volumes.h"
 #include "support/machine.h"
 
 namespace esvr::test {
+
+// ---- Gradients
+
+/// Compares every gradient with differences: each parameter alone, and kappa at fixed scales.
+inline void expectDifferences(const SmallTarget& target, const GradientCase& c,
+                              const std::vector<Ellipsoid>& ellipsoids,
+                              const std::vector<double>& g,
+                              const std::vector<EllipsoidGradient>& gradients) {
+  for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
+    const Differences expected = differencesOf(target, c, ellipsoids[i], g);
+    const double tolerance = toleranceOf(c, ellipsoids[i]) * expected.magnitude;
+    ASSERT_GT(expected.magnitude, 0.0) << "an ellipsoid that no voxel sees proves nothing";
+    for (int n = 0; n < kParameters; ++n)
+      EXPECT_NEAR(gradients[i].byParameter[n], expected.by[n], tolerance)
+          << "ellipsoid " << i << ", parameter " << n;
+    EXPECT_NEAR(gradients[i].byKappa, expected.by[kParameters], tolerance)
+        << "ellipsoid " << i << ", by kappa";
+  }
+}
+
+/// Checks <g, dV> = <dL, dtheta> for a random direction dtheta of all parameters and kappa.
+inline void expectAdjointIdentity(const SmallTarget& target, const GradientCase& c,
+                                  const std::vector<Ellipsoid>& ellipsoids,
+                                  const std::vector<double>& g,
+                                  const std::vector<EllipsoidGradient>& gradients) {
+  Random random(77);
+  const double byKappa = random(-1.0, 1.0);
+  double found = 0.0, expected = 0.0, tolerance = 0.0;
+  for (std::size_t i = 0; i < ellipsoids.size(); ++i) {
+    ParameterVector direction;
+    for (double& d : direction) d = random(-1.0, 1.0);
+    for (int n = 0; n < kParameters; ++n) found += gradients[i].byParameter[n] * direction[n];
+    found += gradients[i].byKappa * byKappa;
+    const Projection p = project(target, g, ellipsoids[i], direction, c.kappa, byKappa);
+    expected += p.sum;
+    tolerance += toleranceOf(c, ellipsoids[i]) * p.magnitude;
+  }
+  EXPECT_NEAR(found, expected, tolerance);
+  EXPECT_GT(tolerance, 0.0) << "ellipsoids that no voxel sees prove nothing";
+}
+
+// ---- Intensities
 
 class Intensities : public OnDevice {
  protected:
