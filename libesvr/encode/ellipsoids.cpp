@@ -162,11 +162,10 @@ constexpr double kTonedDbPerDoubling = 3.0;
 /// dB by which a fit with both signs must be better to be taken (Lab, "Signs"). Terms that cancel each other need more bits.
 constexpr double kSignsGain = 0.5;
 
-// How long fits are, as shares of the iterations of a whole one: a fit that continues a short one, one that continues a
-// whole one (Lab, "Continued fits"), one that continues the frame before (Lab, "Frames that continue"), and one from seeds
-// for a size, unless many voxels saturate.
-constexpr double kContinuedShare = 0.4, kContinuedWholeShare = 0.15, kContinuedFrameShare = 0.3,
-                 kSizedShare = 0.6;
+// How long fits are, as shares of the iterations of a whole one: a fit that continues an earlier one (Lab, "Continued fits"),
+// one that continues the frame before (Lab, "Frames that continue"), and one from seeds for a size, unless many voxels
+// saturate.
+constexpr double kContinuedShare = 0.4, kContinuedFrameShare = 0.3, kSizedShare = 0.6;
 
 /// Of values (Lab, "More ellipsoids or more bits"), and of tones: smoke1 of 25 KB has 34.8 dB of what is
 /// seen with these, and 34.5 with those of values.
@@ -369,7 +368,7 @@ Attempt EllipsoidSearch::wholeFit(double count) const {
     return attempted(job_, options);
   }
   if (!from) return attempted(job_, options);
-  return continued(from->grid, count, isShort ? kContinuedShare : kContinuedWholeShare);
+  return continued(from->grid, count, kContinuedShare);
 }
 
 /// A fit that continues other ellipsoids. It adds some, or drops the weakest first.
