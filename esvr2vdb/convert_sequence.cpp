@@ -168,7 +168,7 @@ class SequenceDecoding {
     if (options_.sequence->input.isWhole()) {
       const EsvrFile& content = file.read(frame.number, limitsOf(own));
       watched_.requireUnchanged();
-      convertContent(own, content, cancel_, log, table);
+      convertContent(own, {content}, cancel_, log, table);
     } else {
       convertFile(own, cancel_, log, table);
     }

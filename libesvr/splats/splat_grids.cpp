@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -226,12 +227,12 @@ SplatGrids makeSplatGrids(const SplatScene& scene, const SplatGridOptions& optio
   const WorkEstimate work =
       estimateWork(field, {.enough = double(options.maxBytes) / volumes, .memory = options.memory});
   requireWithinMemory(volumes * work.bytes(options.memory), options.maxBytes,
-                      "the grids of splats with a voxel size of " + std::to_string(size));
+                      "the grids of splats with a voxel size of " + shortText(size));
   describe("density", GridClass::kFogVolume, size, grids.density.descriptor);
   grids.density.volume = revoxelise(
       field, {.threshold = float(kFaintest / (size * densityScale)), .memory = options.memory});
   if (activeVoxelCount(grids.density.volume) == 0)
-    throw BadInput("the splats are too faint for any active voxel");
+    throw BadInput("its splats are too faint for any active voxel of the size " + shortText(size));
   if (scene.splats.hasColors())
     grids.color = colorsOf(density, field, grids.density, size, options.memory);
   return grids;

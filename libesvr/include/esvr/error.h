@@ -33,6 +33,10 @@ class Error : public std::runtime_error {
         text_.replace(at + 1, stored.size(), unique);
     }
   }
+  /// Puts the name of a file before a text that does not have it.
+  void nameFile(const std::string& path) {
+    if (text_.find(path) == std::string::npos) text_ = path + ": " + text_;
+  }
 
  private:
   ErrorKind kind_;
