@@ -325,6 +325,16 @@ double wantedQuality(const Job& job) {
                            : preset.psnr + boxGain(job.input.source, job.options);
 }
 
+/// \throws UsageError  the quality of a goal is none
+void requireQuality(const Goal& goal) {
+  const auto* values = std::get_if<PsnrGoal>(&goal);
+  const auto* pictures = std::get_if<PictureGoal>(&goal);
+  if (!values && !pictures) return;
+  const double psnr = values ? values->psnr : pictures->psnr;
+  if (!(psnr >= 0.0 && std::isfinite(psnr)))
+    throw UsageError("a PSNR must be finite and not below 0 dB, but is " + shortText(psnr));
+}
+
 /// Active voxels per ellipsoid at the largest number of ellipsoids that a preset may take. With more of them, voxels take
 /// fewer bytes.
 constexpr double kLeastVoxelsEach = 8.0;
@@ -448,9 +458,10 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
 
 void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
   const double error = largestDifference(input.source, decoded);
-  if (error > bound)
-    throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " +
-                         std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
+  if (!(error > bound)) return;
+  const auto [found, most] = textsApart(error, bound, "%.*g", 6);
+  throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " + found +
+                       " exceeds the bound of " + most);
 }
 
 /// Checks the decoded grid against all that it promises.
@@ -818,6 +829,7 @@ PresetQuality qualityOf(Preset preset) {
 }
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
+  encode::requireQuality(options.goal);
   if (!hasNonFinite(input.source)) return encode::converted(input, options);
   return encode::convertKeepingNonFinite(input, options, encode::converted);
 }
