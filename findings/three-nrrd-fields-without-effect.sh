@@ -4,12 +4,13 @@
 # Version:   three 0.187.0 (npm), examples/jsm/loaders/NRRDLoader.js.
 # Input:     a volume of 3 x 1 x 1 values of the type ushort, 258, 3 and 4, as NRRD files that differ in fields of the format's
 #            definition: `encoding: raw` with `endian: little`; the same with `byte skip: 4` and four more bytes before the
-#            values, which writers leave for a foreign header; with `endian: big`; and `encoding: hex`, two digits a byte.
+#            values, which writers leave for a foreign header; with `endian: big`; and `encoding: hex`, two digits a byte. teem 1.12.0
+#            (`unu save -f nrrd -e ascii`) gives 258 3 4 of each.
 # Expected:  258 3 4 from each file, or an error: a loader that does not know a field cannot know the values.
 # Observed:  258 3 4 from the first one only. The bytes that should be skipped are the first values, and there are more values
 #            than the sizes say; big-endian values have their bytes reversed, since the field is used nowhere; and a line of
 #            hex digits is taken for one number, of which the lowest 16 bits are left, and the other values are 0.
-# Matters:   pages that show scans show noise, or nothing, of files that teem, ITK and Slicer read well, and a measurement
+# Matters:   pages that show scans show noise, or nothing, of files that teem reads, and a measurement
 #            taken there is wrong. Convert to raw or gzip, little-endian, with the data behind the header, for the web.
 . "$(dirname "$0")/lib/packages.sh"
 version=0.187.0
