@@ -491,7 +491,7 @@ void convertContent(const Options& given, const Content& content, const CancelTo
   const auto wanted = chooseGrids(given.input, file, given.grids);
   Options options = given;
   // Carried grids are left out only where the resolution does change.
-  const auto chosen = cli::namingFile(given.input, [&] {
+  const auto chosen = namingFile(given.input.string(), [&] {
     options.resolution =
         resolved(given.resolution, storedGrids(file, wanted), decodingOf(file, given), log);
     return writable(file, wanted, options, log);
@@ -501,7 +501,7 @@ void convertContent(const Options& given, const Content& content, const CancelTo
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
   const auto grids =
-      cli::namingFile(given.input, [&] { return decodeAll(file, chosen, options, log); });
+      namingFile(given.input.string(), [&] { return decodeAll(file, chosen, options, log); });
   if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
   tellCarried(file, chosen, options, log);

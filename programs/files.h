@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "core/read_input.h"
-#include "esvr/error.h"
 
 namespace esvr::cli {
 
@@ -51,25 +50,6 @@ class PipedInput {
 
 /// True if there is a file or a folder of this name. Whoever opens it reports why it cannot be read.
 [[nodiscard]] bool isThere(const std::filesystem::path& path);
-
-/// Runs what works on the content of a file. Its errors name the file, which the library often does not know, but for
-/// those of a device and of an interrupted run.
-template <typename Action>
-auto namingFile(const std::filesystem::path& path, const Action& action) {
-  const auto named = [&](auto& error) { error.nameFile(path.string()); };
-  try {
-    return action();
-  } catch (UsageError& error) {
-    named(error);
-    throw;
-  } catch (BadInput& error) {
-    named(error);
-    throw;
-  } catch (MemoryExceeded& error) {
-    named(error);
-    throw;
-  }
-}
 
 struct InputFiles {
   /// All files that arguments and options name as inputs; a copy in place of a pipe.

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/atomic_file.h"
-#include "programs/files.h"
+#include "esvr/error.h"
 #include "programs/option_values.h"
 
 namespace esvr::cli {
@@ -63,7 +63,7 @@ SplatGrids readSplatGrids(const std::filesystem::path& path, const SplatInput& i
                           const HostMemory& memory, const Log& log) {
   const SplatFile file = readSplats(path, {.maxBytes = memory.maxBytes, .up = input.up});
   tellLeftOut(file, log);
-  SplatGrids grids = namingFile(path, [&] {
+  SplatGrids grids = namingFile(path.string(), [&] {
     return makeSplatGrids(file.scene, {.voxelSize = input.voxelSize,
                                        .densityScale = input.densityScale,
                                        .maxBytes = memory.maxBytes,

@@ -8,7 +8,6 @@
 #include <string>
 #include <system_error>
 
-#include "core/atomic_file.h"
 #include "esvr/error.h"
 #include "vdb2esvr/run.h"
 
@@ -115,7 +114,9 @@ bool FrameInputs::haveThatOf(const cli::Frame& frame) const {
 void FrameInputs::add(const cli::Frame& frame, const InputState& state) {
   std::ofstream file(path_, std::ios::app);
   file << frame.number << ' ' << state.bytes << ' ' << state.changed << '\n' << std::flush;
-  if (!file) failAt("cannot write", path_, errno);
+  if (!file)
+    throw RuntimeFailure("cannot write " + path_.string() + ": " +
+                         std::generic_category().message(errno));
 }
 
 void FrameInputs::remove() {

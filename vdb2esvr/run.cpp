@@ -433,7 +433,7 @@ RunRecord convertWatched(const Options& given, const FileRun& run,
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
   Parts parts(options, selected.front(), ranks);
-  const ConvertedFile made = cli::namingFile(given.namedInput(), [&] {
+  const ConvertedFile made = namingFile(given.namedInput().string(), [&] {
     return FileConversion(options, selected, cancel, parts, log).run(choice, record);
   });
   for (const auto& grid : record.grids) tellGrid(options, grid, log);

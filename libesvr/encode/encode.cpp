@@ -757,9 +757,29 @@ void requireNear(const ConvertInput& input) {
     }
 }
 
-Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
-  requirePossible(options);
+/// The options for values that are equal but for roundings: a quality allows errors of much more than these, and one of the
+/// values takes as few bytes as any other one.
+ConvertOptions forConstant(const ConvertInput& input, ConvertOptions options) {
+  constexpr double kReached = 120.0;  // dB; an error of two bits of 24 has 132 or more
+  const auto within = [&](double psnr) { return psnr <= kReached; };
+  const auto* values = std::get_if<PsnrGoal>(&options.goal);
+  const auto* pictures = std::get_if<PictureGoal>(&options.goal);
+  const bool isQuality = std::holds_alternative<PresetGoal>(options.goal) ||
+                         (values && within(values->psnr)) || (pictures && within(pictures->psnr));
+  if (!isQuality || mustBeEllipsoids(options)) return options;
+  const ValueRange range = activeRange(input.source);
+  if (range.min == range.max || !isConstant(range)) return options;
+  options.goal = BoundGoal{double(range.max) - double(range.min)};
+  options.representation = Representation::kVoxels;
+  options.measure = Measure::kValues;
+  options.tone.reset();
+  return options;
+}
+
+Conversion converted(const ConvertInput& input, const ConvertOptions& given) {
+  requirePossible(given);
   requireNear(input);
+  const ConvertOptions options = forConstant(input, given);
   const CancelScope scope(CancelScope::orToken(options.fit.cancel));
   CancelScope::check();
   if (const auto background = nearBackground(input, options))

@@ -104,6 +104,12 @@ class SplatDensity {
     return field;
   }
 
+  /// The smallest and the largest value of a channel of the colors.
+  [[nodiscard]] std::pair<float, float> colorRange(std::size_t channel) const {
+    const auto [least, most] = std::ranges::minmax(splats_.color[channel]);
+    return {least, most};
+  }
+
   /// The same with the amplitudes times a channel of the colors.
   [[nodiscard]] Field timesColor(Field field, std::size_t channel) const {
     for (Chunk& chunk : field.chunks) {
@@ -202,11 +208,15 @@ VectorGrid colorsOf(const SplatDensity& density, const Field& field, const Volum
                                                              .restrictToBricks = true,
                                                              .masks = grid.volume.active,
                                                              .memory = memory});
+    const auto [least, most] = density.colorRange(channel);
     parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
       const auto sums = volume.brickValues(b);
       const auto weights = grid.volume.brickValues(b);
-      forEachActive(volume.active[b],
-                    [&](int v) { sums[std::size_t(v)] /= weights[std::size_t(v)]; });
+      // A mean is within its range, whatever the sums are rounded to.
+      forEachActive(volume.active[b], [&, least = least, most = most](int v) {
+        sums[std::size_t(v)] =
+            std::clamp(sums[std::size_t(v)] / weights[std::size_t(v)], least, most);
+      });
     });
   }
   return colors;

@@ -365,7 +365,11 @@ File convertSource(const ConvertedSource& given, const ConvertOptions& options, 
   ConvertedFile made = reporting(options, progress, [&](const ConvertOptions& common) {
     FileOptions ofFile{.convert = common};
     if (const auto* size = std::get_if<SizeGoal>(&common.goal)) ofFile.size = size->bytes;
-    return convertGrids(sourceOf(given, isLossless(common), nonFinite), ofFile);
+    const auto* path = std::get_if<std::filesystem::path>(&given);
+    const auto convert = [&] {
+      return convertGrids(sourceOf(given, isLossless(common), nonFinite), ofFile);
+    };
+    return path ? namingFile(path->string(), convert) : convert();
   });
   if (made.interrupted) throw Cancelled();
   if (std::holds_alternative<PsnrGoal>(options.goal))  // a preset is as good as the grids allow

@@ -76,4 +76,22 @@ struct Cancelled : Error {
   Cancelled() : Error(ErrorKind::kRuntime, "cancelled") {}
 };
 
+/// Runs what works on the content of a file. Its errors name the file, which functions on volumes do not know, but for those of
+/// a device and of an interrupted run.
+template <typename Action>
+auto namingFile(const std::string& path, const Action& action) {
+  try {
+    return action();
+  } catch (UsageError& error) {
+    error.nameFile(path);
+    throw;
+  } catch (BadInput& error) {
+    error.nameFile(path);
+    throw;
+  } catch (MemoryExceeded& error) {
+    error.nameFile(path);
+    throw;
+  }
+}
+
 }  // namespace esvr
