@@ -507,7 +507,9 @@ void convertContent(const Options& given, const Content& content, const CancelTo
   tellCarried(file, chosen, options, log);
   tellUncut(content, chosen, options, log);
   tellImprecise(file, chosen, log);
-  writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
+  namingFile(given.input.string(), [&] {
+    writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
+  });
   if (options.reference) {
     tellNotCompared(chosen, log);
     if (!compared.empty()) printErrors(options, compared, out);

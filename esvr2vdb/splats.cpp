@@ -94,7 +94,8 @@ void importSplats(const Options& options) {
   if (grids.color && isNano)
     log.warning("the colors are left out: vectors are not written to NanoVDB files");
   watched.requireUnchanged();
-  writeGrids(options.output, {}, written, options.write);
+  namingFile(options.input.string(),
+             [&] { writeGrids(options.output, {}, written, options.write); });
 }
 
 }  // namespace esvr::esvr2vdb

@@ -87,7 +87,8 @@ SplatsAsVdb::SplatsAsVdb(const Source& source, const Log& log) {
   std::vector<GridToWrite> written{&grids.density};
   if (grids.color) written.emplace_back(&*grids.color);
   try {
-    writeGrids(path_, {}, written);
+    namingFile(source.path.string(),
+               [&] { writeGrids(path_, {}, written, {.maxBytes = source.memory.maxBytes}); });
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
