@@ -95,7 +95,7 @@ cli::ProgramText programText() {
           "each GPU of --device, as far as --max-memory allows. A frame that fails is named, and "
           "does not stop the others (--on-error stop); the exit code is that of the first one. "
           "Ctrl-C keeps the frames that are complete, or the groups that are complete in one file. "
-          "With --resume, they are not converted again.\n"
+          "With --resume, they are not converted again, unless their inputs have changed.\n"
           "\n"
           "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program was "
           "built with MPI. All devices and processes together write the bytes that one writes.",
