@@ -159,6 +159,10 @@ std::string textOf(const Figure& figure, double value) {
   return isPsnr(figure) ? cli::decibels(value) : cli::shortNumber(value);
 }
 
+std::pair<std::string, std::string> textsApart(const Figure& figure, double value, double other) {
+  return isPsnr(figure) ? cli::decibelsApart(value, other) : cli::shortNumbersApart(value, other);
+}
+
 nlohmann::ordered_json finiteOrNull(double value) {
   return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json();
 }
@@ -182,10 +186,10 @@ void judgeLimits(const CheckOptions& options, CheckRecord& record) {
       const auto value = valueOf(grid.figures, figure);
       if (!bound || !value || !isLimited(grid, figure)) continue;
       const double limit = bound->absolute(grid.range);
-      if (figure.higherIsBetter ? *value < limit : *value > limit)
-        record.failures.push_back("grid \"" + grid.name + "\": " + figure.header + " " +
-                                  textOf(figure, *value) + ", --" + figure.option + " " +
-                                  textOf(figure, limit));
+      if (figure.higherIsBetter ? *value >= limit : *value <= limit) continue;
+      const auto [found, allowed] = textsApart(figure, *value, limit);
+      record.failures.push_back("grid \"" + grid.name + "\": " + figure.header + " " + found +
+                                ", --" + figure.option + " " + allowed);
     }
 }
 
@@ -296,9 +300,10 @@ void judgeFigures(const std::filesystem::path& path, const Json& stored, const C
       continue;
     }
     const Entry entry = entryOf(path, where, stored[figure.key]);
+    const auto [found, wanted] = textsApart(figure, *value, entry.value);
     tell(judge(figure.higherIsBetter, entry, *value),
-         where + " " + textOf(figure, *value) + ", baseline " + textOf(figure, entry.value) +
-             " within " + cli::shortNumber(entry.tolerance),
+         where + " " + found + ", baseline " + wanted + " within " +
+             cli::shortNumber(entry.tolerance),
          record);
   }
 }

@@ -204,17 +204,17 @@ void restrictToNamed(const Options& options, ReadPart& wanted) {
   }
 }
 
-EsvrFile read(const Options& options, const cli::Log& log) {
+PartOfFile read(const Options& options, const cli::Log& log) {
   ReadPart wanted = options.part;
   wanted.limits = limitsOf(options);
   if (!options.grids.empty()) restrictToNamed(options, wanted);
-  if (readsAll(options) && !wanted.grids) return readEsvr(options.input, wanted.limits);
+  if (readsAll(options) && !wanted.grids) return {readEsvr(options.input, wanted.limits), {}, 0};
   PartOfFile part = readEsvrPart(options.input, wanted);
   // Small files are read once for the names of the grids, and once more for the grids.
   const std::uint64_t bytes = std::filesystem::file_size(options.input);
   if (part.bytesRead < bytes)
     log.info("read " + std::to_string(part.bytesRead) + " of " + std::to_string(bytes) + " bytes");
-  return std::move(part.file);
+  return part;
 }
 
 /// The chosen grids that the output can hold. Says which of them are left out.
@@ -407,15 +407,20 @@ void tellImprecise(const EsvrFile& file, const std::vector<ListedGrid>& chosen,
 }
 
 /// Warns of grids that come back whole, although a part of their ellipsoids was asked for.
-void tellUncut(const EsvrFile& file, const std::vector<ListedGrid>& chosen, const Options& options,
-               const cli::Log& log) {
+void tellUncut(const Content& content, const std::vector<ListedGrid>& chosen,
+               const Options& options, const cli::Log& log) {
+  const auto isPart = [&](const StoredGrid& grid) {
+    const auto at = std::size_t(&grid - content.file.grids.data());
+    return !content.ellipsoidsInFile.empty() &&
+           grid.field.ellipsoidCount() < content.ellipsoidsInFile[at];
+  };
   for (const auto& [grid, name, place] : chosen) {
     if (grid.isCarried) continue;
-    const StoredGrid& part = storedParts(file, grid).front();
+    const StoredGrid& stored = storedParts(content.file, grid).front();
     const std::string start = "grid \"" + name + "\" comes back whole: ";
-    if (part.voxels && isCut(options))
+    if (stored.voxels && isCut(options))
       log.warning(start + "it has voxels, and --lod and --max-ellipsoids select ellipsoids");
-    else if (options.part.layers && layerCount(part) == 1)
+    else if (options.part.layers && layerCount(stored) == 1 && !isPart(stored))
       log.warning(start + "it has a single layer");
   }
 }
@@ -476,31 +481,37 @@ void convertFile(const Options& options, const CancelToken& cancel, const cli::L
                  std::ostream& out) {
   // It may be read twice, for the names of the grids and for the grids.
   const cli::WatchedInputs watched({options.input});
-  const EsvrFile file = read(options, log);
+  const PartOfFile part = read(options, log);
   watched.requireUnchanged();
-  convertContent(options, file, cancel, log, out);
+  convertContent(options, {part.file, part.ellipsoidsInFile}, cancel, log, out);
 }
 
-void convertContent(const Options& given, const EsvrFile& file, const CancelToken& cancel,
+void convertContent(const Options& given, const Content& content, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
+  const EsvrFile& file = content.file;
   if (writesSplats(given)) return exportSplats(given, file, log);
   const auto wanted = chooseGrids(given.input, file, given.grids);
   Options options = given;
   // Carried grids are left out only where the resolution does change.
-  options.resolution =
-      resolved(given.resolution, storedGrids(file, wanted), decodingOf(file, given), log);
-  const auto chosen = writable(file, wanted, options, log);
+  const auto chosen = namingFile(given.input.string(), [&] {
+    options.resolution =
+        resolved(given.resolution, storedGrids(file, wanted), decodingOf(file, given), log);
+    return writable(file, wanted, options, log);
+  });
   cli::WatchedInputs watched;
   if (options.reference) watched.add(*options.reference);
   std::vector<ComparedGrid> compared;
   if (options.reference) compared = counterparts(file, chosen, options);
-  const auto grids = decodeAll(file, chosen, options, log);
+  const auto grids =
+      namingFile(given.input.string(), [&] { return decodeAll(file, chosen, options, log); });
   if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
   tellCarried(file, chosen, options, log);
-  tellUncut(file, chosen, options, log);
+  tellUncut(content, chosen, options, log);
   tellImprecise(file, chosen, log);
-  writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
+  namingFile(given.input.string(), [&] {
+    writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);
+  });
   if (options.reference) {
     tellNotCompared(chosen, log);
     if (!compared.empty()) printErrors(options, compared, out);
@@ -653,7 +664,8 @@ void importSplats(const Options& options) {
   if (grids.color && isNano)
     log.warning("the colors are left out: vectors are not written to NanoVDB files");
   watched.requireUnchanged();
-  writeGrids(options.output, {}, written, options.write);
+  namingFile(options.input.string(),
+             [&] { writeGrids(options.output, {}, written, options.write); });
 }
 
 }  // namespace esvr::esvr2vdb

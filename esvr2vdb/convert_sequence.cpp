@@ -159,7 +159,7 @@ class SequenceDecoding {
   void decodeWithin(std::size_t i, std::uint64_t maxBytes, FileOfFrames& file) {
     const cli::Frame& frame = frames_[i];
     Options own = options_;
-    own.memory.maxBytes = maxBytes;
+    own.memory.maxBytes = own.write.maxBytes = maxBytes;
     own.input = frame.input, own.output = frame.output;
     if (own.reference)
       own.reference = cli::FramePattern::ofInput(own.reference->string())->toRead(frame.number);
@@ -168,7 +168,7 @@ class SequenceDecoding {
     if (options_.sequence->input.isWhole()) {
       const EsvrFile& content = file.read(frame.number, limitsOf(own));
       watched_.requireUnchanged();
-      convertContent(own, content, cancel_, log, table);
+      convertContent(own, {content}, cancel_, log, table);
     } else {
       convertFile(own, cancel_, log, table);
     }

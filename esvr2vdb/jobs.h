@@ -1,6 +1,7 @@
 #pragma once
 /// The options and the jobs of esvr2vdb. Each job throws an esvr::Error if it fails.
 
+#include <cstdint>
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
@@ -96,9 +97,15 @@ void convert(const Options& options);
 void convertFile(const Options& options, const CancelToken& cancel, const cli::Log& log,
                  std::ostream& out);
 
+/// The content of a file, or a part of it.
+struct Content {
+  const EsvrFile& file;
+  std::vector<std::uint64_t> ellipsoidsInFile{};  ///< as in PartOfFile; empty if all is there
+};
+
 /// The same for the content of a file, which may be a frame of a sequence.
 /// \throws Cancelled  nothing was written
-void convertContent(const Options& options, const EsvrFile& file, const CancelToken& cancel,
+void convertContent(const Options& options, const Content& content, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out);
 
 /// The limits with which the input is read.

@@ -244,6 +244,7 @@ std::optional<Options> parseOptions(int argc, const char* const* argv) {
   options.threads = arguments->threads;
   options.verbosity = arguments->verbosity;
   options.memory = cli::hostMemoryOf(*arguments);
+  options.write.maxBytes = options.memory.maxBytes;
   if (options.job == Job::kConvert) readConversion(*arguments, options);
   return options;
 }

@@ -164,7 +164,17 @@ std::string exactNumber(double value) {
 std::string decibels(double value) {
   return std::isinf(value) ? "exact" : formatted("%.2f", value);
 }
+std::pair<std::string, std::string> decibelsApart(double value, double other) {
+  if (std::isinf(value) || std::isinf(other)) return {decibels(value), decibels(other)};
+  return textsApart(value, other, "%.*f", 2);
+}
+
 std::string shortNumber(double value) { return formatted("%.4g", value); }
+
+std::pair<std::string, std::string> shortNumbersApart(double value, double other) {
+  return textsApart(value, other, "%.*g", 4);
+}
+
 std::string completeOf(std::uint64_t done, std::uint64_t all, const std::string& thing) {
   return std::to_string(done) + " of " + counted(all, thing) + (done == 1 ? " is" : " are") +
          " complete";

@@ -83,8 +83,12 @@ class Table {
 [[nodiscard]] std::string exactNumber(double value);
 /// A PSNR with two decimals, for example "51.54"; "exact" if it is infinite.
 [[nodiscard]] std::string decibels(double value);
+/// A PSNR and another one that a message says to differ from it, with as many decimals as that takes.
+[[nodiscard]] std::pair<std::string, std::string> decibelsApart(double value, double other);
 /// A number with four significant digits.
 [[nodiscard]] std::string shortNumber(double value);
+/// A number and another one that a message says to differ from it, with as many digits as that takes.
+[[nodiscard]] std::pair<std::string, std::string> shortNumbersApart(double value, double other);
 using esvr::counted;
 /// What an interrupted run leaves, for example "1 of 3 frames is complete". \param thing  one of them
 [[nodiscard]] std::string completeOf(std::uint64_t done, std::uint64_t all,

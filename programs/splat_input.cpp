@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/atomic_file.h"
+#include "esvr/error.h"
 #include "programs/option_values.h"
 
 namespace esvr::cli {
@@ -62,10 +63,12 @@ SplatGrids readSplatGrids(const std::filesystem::path& path, const SplatInput& i
                           const HostMemory& memory, const Log& log) {
   const SplatFile file = readSplats(path, {.maxBytes = memory.maxBytes, .up = input.up});
   tellLeftOut(file, log);
-  SplatGrids grids = makeSplatGrids(file.scene, {.voxelSize = input.voxelSize,
-                                                 .densityScale = input.densityScale,
-                                                 .maxBytes = memory.maxBytes,
-                                                 .memory = memory.voxels});
+  SplatGrids grids = namingFile(path.string(), [&] {
+    return makeSplatGrids(file.scene, {.voxelSize = input.voxelSize,
+                                       .densityScale = input.densityScale,
+                                       .maxBytes = memory.maxBytes,
+                                       .memory = memory.voxels});
+  });
   log.detail("voxels of the size " + shortNumber(grids.voxelSize) + ", in which an extinction of " +
              shortNumber(input.densityScale.value_or(file.scene.densityScale)) +
              " for a unit of the world is a density of 1");
@@ -84,7 +87,8 @@ SplatsAsVdb::SplatsAsVdb(const Source& source, const Log& log) {
   std::vector<GridToWrite> written{&grids.density};
   if (grids.color) written.emplace_back(&*grids.color);
   try {
-    writeGrids(path_, {}, written);
+    namingFile(source.path.string(),
+               [&] { writeGrids(path_, {}, written, {.maxBytes = source.memory.maxBytes}); });
   } catch (...) {
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);

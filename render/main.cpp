@@ -464,6 +464,25 @@ void reportPrecision(const Options& options, const std::vector<Scene>& scenes) {
   }
 }
 
+/// Warns that nothing is left by --clip or --slice, whose places may be those of another grid.
+void reportCut(const Options& options, const std::vector<Scene>& scenes) {
+  if (!options.clip) return;
+  const auto isCutOff = [&clip = *options.clip](const Scene& scene) {
+    const Coord low = scene.box.min, high = scene.box.max;
+    // A voxel is drawn up to its neighbours.
+    const auto misses = [&](std::size_t axis, int first, int last) {
+      return clip.low[axis] >= last + 1.0 || clip.high[axis] <= first - 1.0;
+    };
+    return misses(0, low.x, high.x) || misses(1, low.y, high.y) || misses(2, low.z, high.z);
+  };
+  if (!std::ranges::all_of(scenes, isCutOff)) return;
+  cli::Log(kProgram, options.verbosity)
+      .warning(
+          options.input.string() + ", " + scenes.front().grid +
+          ": nothing active is drawn; --clip and --slice leave a box outside its active voxels, " +
+          cli::textOf(scenes.front().box));
+}
+
 /// Warns that --between sum has no effect on a grid. \return whether it has none
 bool reportBetween(const Options& options, const std::vector<Scene>& scenes) {
   if (options.between != Between::kSum || hasSum(scenes.front())) return false;
@@ -505,6 +524,7 @@ void drawSequence(const Options& options, const DrawSettings& settings, const Ca
   const auto all = scenesOfAll(options, input);
   reportTransform(options, all);
   reportPrecision(options, all);
+  reportCut(options, all);
   RenderOptions r = renderOptions(options, all);
   r.cancel = &cancel;
   saveTransfer(options, r.transfer);
@@ -539,6 +559,7 @@ void run(const Options& options) {
   auto scenes = readScenes(sceneFile(options, options.input));
   reportTransform(options, scenes);
   reportPrecision(options, scenes);
+  reportCut(options, scenes);
   (void)reportBetween(options, scenes);
   RenderOptions r = renderOptions(options, scenes);
   Drawing drawing(std::move(scenes), settings);

@@ -95,7 +95,7 @@ cli::ProgramText programText() {
           "each GPU of --device, as far as --max-memory allows. A frame that fails is named, and "
           "does not stop the others (--on-error stop); the exit code is that of the first one. "
           "Ctrl-C keeps the frames that are complete, or the groups that are complete in one file. "
-          "With --resume, they are not converted again.\n"
+          "With --resume, they are not converted again, unless their inputs have changed.\n"
           "\n"
           "mpirun -n N vdb2esvr ... fits the chunks of a volume on N processes, if the program was "
           "built with MPI. All devices and processes together write the bytes that one writes.",
@@ -137,7 +137,7 @@ void addGoalOptions(cli::po::options_description& options) {
      "bound of one grid, as with --psnr; voxels are stored")
     ("max-relative-error", value<std::string>()->value_name("E[,F]"),
      "keep the error of every voxel within the share E of its magnitude, such as 1%, or of the magnitude F "
-     "where it is smaller (default: the smallest one above 0); voxels are stored")
+     "where it is smaller (default: the smallest one above 0, at least 1.2e-38); voxels are stored")
     ("representation", value<std::string>()->value_name("R")->default_value("auto"),
      "ellipsoids, voxels, or auto (whichever are better or smaller)")
     ("measure", value<std::string>()->value_name("M")->default_value("auto"),

@@ -361,11 +361,11 @@ void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
     for (const auto& name : record.notFitted) text += ", without grid \"" + name + "\"";
     throw RuntimeFailure(text);
   }
-  if (const ConvertedGrid* grid = firstBelow(record))
-    throw TargetMissed("grid \"" + grid->uniqueName + "\" reached " +
-                       cli::decibels(grid->metrics.psnrBox) + " dB instead of " +
-                       cli::decibels(*grid->wantedPsnr) + " dB; " + options.output.string() +
-                       " was written");
+  if (const ConvertedGrid* grid = firstBelow(record)) {
+    const auto [reached, wanted] = cli::decibelsApart(grid->metrics.psnrBox, *grid->wantedPsnr);
+    throw TargetMissed("grid \"" + grid->uniqueName + "\" reached " + reached + " dB instead of " +
+                       wanted + " dB; " + options.output.string() + " was written");
+  }
 }
 
 /// The devices of this process. The ranks of a host take its GPUs in turn.
@@ -426,8 +426,9 @@ RunRecord convertWatched(const Options& given, const FileRun& run,
   const std::vector<Device> selected = devices.get();
   tellDevices(selected, options, log);
   Parts parts(options, selected.front(), ranks);
-  const ConvertedFile made =
-      FileConversion(options, selected, cancel, parts, log).run(choice, record);
+  const ConvertedFile made = namingFile(given.namedInput().string(), [&] {
+    return FileConversion(options, selected, cancel, parts, log).run(choice, record);
+  });
   for (const auto& grid : record.grids) tellGrid(options, grid, log);
   if (options.onlyFits) return record;
   watched.requireUnchanged();  // the grids were read one after the other

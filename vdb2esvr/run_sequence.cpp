@@ -24,6 +24,7 @@
 #include "programs/resources.h"
 #include "programs/run_main.h"
 #include "programs/sequence.h"
+#include "vdb2esvr/kept_frames.h"
 #include "vdb2esvr/options.h"
 #include "vdb2esvr/progress_bar.h"
 #include "vdb2esvr/records.h"
@@ -88,6 +89,9 @@ class FrameConversion {
   void convert(const Options& own, FrameRecord& frame, const StoreFile& store);
 
   [[nodiscard]] std::vector<FrameRecord>& frames() { return record_.frames; }
+
+  /// Tells what becomes of a frame before it ends.
+  void tell(const std::string& what);
 
   /// Ends the run and tells the warnings.
   [[nodiscard]] SequenceRecord finish();
@@ -267,6 +271,12 @@ void FrameConversion::tellEnd(const FrameRecord& frame) {
   bar_.show(progress_);
 }
 
+void FrameConversion::tell(const std::string& what) {
+  const std::lock_guard lock(mutex_);
+  bar_.hide();
+  log_.info(what);
+}
+
 double FrameConversion::secondsSoFar() {
   seconds_ += watch_.lap();
   return seconds_;
@@ -317,22 +327,30 @@ class SequenceConversion {
   }
 
   void convert(FrameRecord& record, int worker) {
-    if (keep(record)) return;
-    const Options own = conversion_.optionsOf(record.frame, worker);
+    Options own = conversion_.optionsOf(record.frame, worker);
+    if (keep(record, record.frame.input, own.overwrite)) return;
     conversion_.convert(own, record, writingTo(own));
   }
 
   void hold(const FrameRecord& source, FrameRecord& holder) {
     if (source.failure) throw cli::failureToHold(source.frame, *source.failure);
-    if (keep(holder)) return;
-    cli::copyOutput(source.frame.output, holder.frame.output, options_.overwrite);
+    bool overwrite = options_.overwrite;
+    if (keep(holder, source.frame.output, overwrite)) return;
+    cli::copyOutput(source.frame.output, holder.frame.output, overwrite);
     holder.bytesOut = source.bytesOut;
     holder.state = FrameState::kHeld;
   }
 
-  /// Keeps an output that is there already, if the run continues another one.
-  bool keep(FrameRecord& record) const {
+  /// Keeps an output that is there already, if the run continues another one and what it is made of has not changed.
+  /// \param overwrite  becomes true if the output is older, and is replaced
+  bool keep(FrameRecord& record, const fs::path& madeOf, bool& overwrite) {
     if (!options_.resume || !cli::isThere(record.frame.output)) return false;
+    if (isOlder(record.frame.output, madeOf)) {
+      conversion_.tell(cli::textOf(record.frame) + " is converted again: " + madeOf.string() +
+                       " is newer than " + record.frame.output.string());
+      overwrite = true;
+      return false;
+    }
     record.bytesOut = fs::file_size(record.frame.output);
     record.state = FrameState::kKept;
     return true;
@@ -344,78 +362,6 @@ class SequenceConversion {
   const std::multimap<std::size_t, std::size_t> holders_;
   FrameConversion conversion_;
 };
-
-// The groups of one file.
-
-/// The indices of the frames of a group.
-using PlannedGroup = std::vector<std::size_t>;
-
-[[noreturn]] void refuse(const std::string& why) {
-  throw UsageError("the partial file " + why +
-                   "; --resume continues a run with the same options only");
-}
-
-/// The planned group of each frame, by the number of the frame.
-std::map<cli::FrameNumber, std::size_t> groupsByNumber(const std::vector<cli::Frame>& frames,
-                                                       const std::vector<PlannedGroup>& planned) {
-  std::map<cli::FrameNumber, std::size_t> groups;
-  for (std::size_t g = 0; g < planned.size(); ++g)
-    for (const std::size_t frame : planned[g]) groups[frames[frame].number] = g;
-  return groups;
-}
-
-bool hasAll(const std::vector<cli::Frame>& frames, const PlannedGroup& group,
-            const std::set<cli::FrameNumber>& stored) {
-  return std::ranges::all_of(
-      group, [&](std::size_t frame) { return stored.contains(frames[frame].number); });
-}
-
-/// Divides frames with increasing numbers into groups of kGroupFrames; the last one may have fewer. A
-/// frame that holds another one is in the group of that frame. Frames that
-/// are left out are in no group.
-std::vector<PlannedGroup> planGroups(const std::vector<cli::Frame>& frames) {
-  std::vector<PlannedGroup> groups;
-  std::size_t withInput =
-      kGroupFrames;  // frames with an input in the last group; no frame is held by it
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (frames[i].missing && !frames[i].holds) continue;
-    if (!frames[i].holds && withInput++ == kGroupFrames) groups.emplace_back(), withInput = 1;
-    groups.back().push_back(i);
-  }
-  return groups;
-}
-
-/// What a run that continues another one keeps of its partial file.
-struct KeptGroups {
-  std::size_t planned = 0;  ///< number of planned groups that are complete
-  std::size_t stored = 0;   ///< number of groups of the partial file that hold them
-};
-
-/// Finds the planned groups that a partial file has completely. A planned group may be several
-/// groups of the file. It may lack frames that could not be converted, if the file has frames of a
-/// later group.
-/// \param stored  the frames of the partial file
-/// \throws UsageError  the partial file has frames or groups that are not planned
-KeptGroups keptGroups(const std::vector<cli::Frame>& frames,
-                      const std::vector<PlannedGroup>& planned,
-                      const std::vector<SequenceFrame>& stored) {
-  if (stored.empty()) return {};
-  const auto groups = groupsByNumber(frames, planned);
-  std::set<cli::FrameNumber> numbers;
-  std::optional<std::size_t> last;  // planned group of the frame before
-  KeptGroups kept;
-  for (const SequenceFrame& frame : stored) {
-    const auto group = groups.find(frame.number);
-    if (group == groups.end()) refuse("has frame " + std::to_string(frame.number));
-    const bool beginsStored = numbers.empty() || frame.group != stored[numbers.size() - 1].group;
-    if (last && *last != group->second && !beginsStored) refuse("has other groups");
-    if (last != group->second) kept = {group->second, frame.group};
-    last = group->second;
-    numbers.insert(frame.number);
-  }
-  if (hasAll(frames, planned[*last], numbers)) kept = {*last + 1, stored.back().group + 1};
-  return kept;
-}
 
 // One file for all frames.
 
@@ -438,6 +384,7 @@ bool haveSameGrids(const EsvrFile& a, const EsvrFile& b) {
 
 struct EncodedFrame {
   std::size_t index = 0;  ///< in the record
+  InputState input;       ///< as it was before it was read
   std::vector<std::byte> bytes;
 };
 
@@ -472,6 +419,7 @@ class GroupConversion {
     Options own = conversion_.optionsOf(frame.frame, worker_);
     own.resume = false;  // the group is converted again as a whole
     if (previous_) own.previous = {&*previous_, before_};
+    last_.input = stateOf(frame.frame);
     conversion_.convert(own, frame, [&](const EsvrFile& file) { return encode(index, file); });
     keepEncoded();
     before_ = std::exchange(frame.before, {});
@@ -481,6 +429,7 @@ class GroupConversion {
     FrameRecord& frame = conversion_.frames()[index];
     const FrameRecord& source = conversion_.frames()[*frame.frame.holds];
     if (source.failure) throw cli::failureToHold(source.frame, *source.failure);
+    last_.input = {};
     frame.bytesOut = encode(index, *previous_).fileBytes;
     keepEncoded();
     frame.state = FrameState::kHeld;
@@ -492,7 +441,8 @@ class GroupConversion {
     frame.gridsDiffer = previous_ && !haveSameGrids(*previous_, file);
     const EsvrFile* before = previous_ && !frame.gridsDiffer ? &*previous_ : nullptr;
     const std::string name = cli::textOf(frame.frame);
-    last_ = {index, encodeFrame(file, before)};
+    last_.index = index;
+    last_.bytes = encodeFrame(file, before);
     decoded_ = decodeFrame(last_.bytes, name, limits_, before);
     return inspectEsvr(last_.bytes, name);
   }
@@ -538,7 +488,8 @@ class FileOfGroups {
         cancel_(cancel),
         groups_(planGroups(frames)),
         conversion_(options, frames, cancel),
-        writer_(options.output, {options.overwrite, partialOf(options), hashOfOrigin(options)}) {
+        writer_(options.output, {options.overwrite, partialOf(options), hashOfOrigin(options)}),
+        inputs_(SequenceWriter::partialPath(options.output), options.resume) {
     keepGroups(frames);
   }
 
@@ -548,7 +499,10 @@ class FileOfGroups {
                      [&](const cli::Task& task) { return convert(task); });
     markLost();
     FileFigures file{.groups = writer_.groupCount()};
-    if (appended_ == left && file.groups > 0) file.bytes = writer_.finish();
+    if (appended_ == left && file.groups > 0) {
+      file.bytes = writer_.finish();
+      inputs_.remove();
+    }
     SequenceRecord record = conversion_.finish();
     record.file = file;
     return record;
@@ -556,7 +510,12 @@ class FileOfGroups {
 
  private:
   void keepGroups(const std::vector<cli::Frame>& frames) {
-    const KeptGroups kept = keptGroups(frames, groups_, writer_.frames());
+    KeptGroups kept = keptGroups(frames, groups_, writer_.frames());
+    if (const auto changed = keepUnchanged(inputs_, frames, groups_, writer_.frames(), kept))
+      conversion_.tell(changed->input.string() + " is not as it was when " + cli::textOf(*changed) +
+                       " was converted; the frames from " +
+                       std::to_string(frames[groups_[kept.planned].front()].number) +
+                       " on are converted again");
     if (kept.stored < writer_.groupCount()) writer_.dropGroups(kept.stored);
     first_ = kept.planned;
     auto record = conversion_.frames().begin();
@@ -584,6 +543,8 @@ class FileOfGroups {
 
   void append(std::vector<EncodedFrame>& frames) {
     const Completion completion;  // a group that is converted is kept
+    for (const EncodedFrame& frame : frames)
+      inputs_.add(conversion_.frames()[frame.index].frame, frame.input);
     for (EncodedFrame& frame : frames) {
       FrameRecord& record = conversion_.frames()[frame.index];
       if (record.gridsDiffer) writer_.endGroup();
@@ -607,6 +568,7 @@ class FileOfGroups {
   const std::vector<PlannedGroup> groups_;
   FrameConversion conversion_;
   SequenceWriter writer_;
+  FrameInputs inputs_;
   std::size_t first_ = 0;  ///< the first planned group that is not in the file yet
   cli::Turnstile turnstile_;
   std::size_t appended_ = 0;  ///< planned groups that this run appended; guarded by the turnstile
@@ -629,7 +591,10 @@ SequenceRecord convertFrames(const Options& options, const CancelToken& cancel) 
   const bool isOneFile = sequence.output.isWhole();
   const bool mayExist = options.overwrite || (options.resume && !isOneFile);
   std::vector<fs::path> more{options.report};
-  if (isOneFile) more.push_back(SequenceWriter::partialPath(options.output));
+  if (isOneFile) {
+    const fs::path partial = SequenceWriter::partialPath(options.output);
+    more.insert(more.end(), {partial, FrameInputs::pathFor(partial)});
+  }
   cli::checkFrameOutputs(sequence, frames,
                          {.extensions = {".esvr"}, .mayExist = mayExist, .moreOutputs = more});
   return isOneFile ? convertGroups(options, frames, cancel)

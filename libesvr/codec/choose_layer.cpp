@@ -13,6 +13,7 @@
 #include "codec/brick_coder.h"
 #include "codec/frame_coder.h"
 #include "codec/voxel_coder.h"
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/quantised.h"
@@ -318,7 +319,7 @@ double shareOfBound(RoundedSigns signs) {
 
 void requireUsable(double bound) {
   if (!(std::isfinite(bound) && bound > 0.0))
-    throw UsageError("the largest error must be above 0, not " + std::to_string(bound));
+    throw UsageError("the largest error must be above 0, not " + shortText(bound));
 }
 
 }  // namespace

@@ -410,7 +410,7 @@ InactiveValues InactiveValues::ofComponent(std::size_t component) const {
 void Narrowing::addError(double value, double error, Coord at) {
   errors.add(error, at);
   squares += error * error;
-  relative = std::max(relative, std::abs(error / value));
+  relative = std::max(relative, std::abs(error) / std::max(std::abs(value), kLeastNormalFloat));
 }
 
 Narrowing between(const Narrowing& a, const Narrowing& b) {

@@ -316,10 +316,16 @@ void dropNonFinite(SparseVolume& volume) {
   });
 }
 
+bool isConstant(const ValueRange& values) {
+  constexpr double kFewRoundings = 0x1p-22;
+  const double low = values.min, high = values.max;
+  return high - low <= kFewRoundings * std::max(std::abs(low), std::abs(high));
+}
+
 ValueSpan spanOf(const ValueRange& active, double background) {
   const double low = active.min, high = active.max;
   const double gap = std::max({low - background, background - high, 0.0});
-  const bool isNear = low == high ? std::isfinite(background) : gap <= high - low;
+  const bool isNear = isConstant(active) ? std::isfinite(background) : gap <= high - low;
   if (!isNear) return {low, high, true};
   return {std::min(low, background), std::max(high, background), false};
 }
@@ -330,7 +336,7 @@ ValueSpan spanOf(const SparseVolume& volume) {
 
 double peakOf(const ValueRange& active, double background) {
   const double low = active.min, high = active.max;
-  if (low == high) return low == 0.0 ? 1.0 : std::abs(low);
+  if (isConstant(active)) return low == 0.0 ? 1.0 : std::max(std::abs(low), std::abs(high));
   if (low < 0.0 && high > 0.0) return std::max(-low, high);
   const ValueSpan span = spanOf(active, background);
   return low >= 0.0 ? high - std::max(span.low, 0.0) : std::min(span.high, 0.0) - low;

@@ -157,9 +157,10 @@ void allowForNarrowing(const VolumeGrid& source, Goal& goal) {
   if (narrowing.errors.count() == 0) return;
   const auto less = [&](double bound, double lost, const char* unit = "") {
     if (lost < bound) return bound - lost;
+    const auto [by, most] = textsApart(lost, bound, "%.*g", 6);
     throw CannotConvert("grid '" + shownName(source.descriptor.name) +
-                        "': floats differ from its doubles by up to " + shortText(lost) + unit +
-                        ", and the bound is " + shortText(bound));
+                        "': floats differ from its doubles by up to " + by + unit +
+                        ", and the bound is " + most);
   };
   if (auto* within = std::get_if<BoundGoal>(&goal)) {
     const double range = narrowing.max - narrowing.min;

@@ -327,6 +327,16 @@ double wantedQuality(const Job& job) {
                            : preset.psnr + boxGain(job.input.source, job.options);
 }
 
+/// \throws UsageError  the quality of a goal is none
+void requireQuality(const Goal& goal) {
+  const auto* values = std::get_if<PsnrGoal>(&goal);
+  const auto* pictures = std::get_if<PictureGoal>(&goal);
+  if (!values && !pictures) return;
+  const double psnr = values ? values->psnr : pictures->psnr;
+  if (!(psnr >= 0.0 && std::isfinite(psnr)))
+    throw UsageError("a PSNR must be finite and not below 0 dB, but is " + shortText(psnr));
+}
+
 /// Active voxels per ellipsoid at the largest number of ellipsoids that a preset may take. With more of them, voxels take
 /// fewer bytes.
 constexpr double kLeastVoxelsEach = 8.0;
@@ -450,9 +460,10 @@ StoredGrid throughTheFormat(StoredGrid grid, const StoredGrid* previous,
 
 void requireBound(const ConvertInput& input, const SparseVolume& decoded, double bound) {
   const double error = largestDifference(input.source, decoded);
-  if (error > bound)
-    throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " +
-                         std::to_string(error) + " exceeds the bound of " + std::to_string(bound));
+  if (!(error > bound)) return;
+  const auto [found, most] = textsApart(error, bound, "%.*g", 6);
+  throw RuntimeFailure("grid '" + shownName(input.descriptor.name) + "': an error of " + found +
+                       " exceeds the bound of " + most);
 }
 
 /// Checks the decoded grid against all that it promises.
@@ -748,9 +759,29 @@ void requireNear(const ConvertInput& input) {
     }
 }
 
-Conversion converted(const ConvertInput& input, const ConvertOptions& options) {
-  requirePossible(options);
+/// The options for values that are equal but for roundings: a quality allows errors of much more than these, and one of the
+/// values takes as few bytes as any other one.
+ConvertOptions forConstant(const ConvertInput& input, ConvertOptions options) {
+  constexpr double kReached = 120.0;  // dB; an error of two bits of 24 has 132 or more
+  const auto within = [&](double psnr) { return psnr <= kReached; };
+  const auto* values = std::get_if<PsnrGoal>(&options.goal);
+  const auto* pictures = std::get_if<PictureGoal>(&options.goal);
+  const bool isQuality = std::holds_alternative<PresetGoal>(options.goal) ||
+                         (values && within(values->psnr)) || (pictures && within(pictures->psnr));
+  if (!isQuality || mustBeEllipsoids(options)) return options;
+  const ValueRange range = activeRange(input.source);
+  if (range.min == range.max || !isConstant(range)) return options;
+  options.goal = BoundGoal{double(range.max) - double(range.min)};
+  options.representation = Representation::kVoxels;
+  options.measure = Measure::kValues;
+  options.tone.reset();
+  return options;
+}
+
+Conversion converted(const ConvertInput& input, const ConvertOptions& given) {
+  requirePossible(given);
   requireNear(input);
+  const ConvertOptions options = forConstant(input, given);
   const CancelScope scope(CancelScope::orToken(options.fit.cancel));
   CancelScope::check();
   if (const auto background = nearBackground(input, options))
@@ -820,6 +851,7 @@ PresetQuality qualityOf(Preset preset) {
 }
 
 Conversion convertVolume(const ConvertInput& input, const ConvertOptions& options) {
+  encode::requireQuality(options.goal);
   if (!hasNonFinite(input.source)) return encode::converted(input, options);
   return encode::convertKeepingNonFinite(input, options, encode::converted);
 }

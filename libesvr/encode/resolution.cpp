@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -27,9 +28,9 @@ using Matrix = std::array<double, 16>;
 
 void requireFactor(double factor) {
   if (!(factor >= kFinestFactor && factor <= kCoarsestFactor))
-    throw UsageError("voxels can become between " + std::to_string(kFinestFactor) + " and " +
-                     std::to_string(int(kCoarsestFactor)) + " times as large, not " +
-                     std::to_string(factor) + " times");
+    throw UsageError("voxels can become between " + shortText(kFinestFactor) + " and " +
+                     shortText(kCoarsestFactor) + " times as large, not " + shortText(factor) +
+                     " times");
 }
 
 const Matrix& affineOf(const Transform& transform) {

@@ -157,6 +157,9 @@ Judge::Judgement Judge::operator()(SparseVolume volume) const {
   forgiveFilled(values_, filled_, volume);
   const auto ofValues = [&] { return psnrOverBox(values_, volume, box_); };
   if (!pictures_) return {ofValues()};
+  // Rounding or the factor of the mass has taken values near the largest float beyond it.
+  constexpr double kUseless = -std::numeric_limits<double>::infinity();
+  if (hasNonFinite(volume)) return {kUseless, kUseless};
   const TransmittancePsnr seen = pictures_->measure(volume);
   return {valueGain_ ? std::min(seen.psnr50, ofValues() + *valueGain_) : seen.psnr50,
           0.5 * (seen.psnr50 + seen.psnr10)};

@@ -344,13 +344,15 @@ double psnrOverBox(const SparseVolume& reference, const SparseVolume& candidate,
 // Errors relative to each value.
 
 double leastMagnitude(const SparseVolume& volume) {
-  double least = std::numeric_limits<double>::infinity();
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
   for (std::size_t b = 0; b < volume.brickCount(); ++b)
     for (int v = 0; v < kBrickVoxels; ++v) {
       const double magnitude = std::abs(double(volume.brickValues(b)[std::size_t(v)]));
-      if (volume.active[b].test(v) && magnitude > 0.0) least = std::min(least, magnitude);
+      if (!volume.active[b].test(v) || !(magnitude > 0.0)) continue;
+      least = std::min(least, magnitude);
+      most = std::max(most, magnitude);
     }
-  return least;
+  return most < kLeastNormalFloat ? least : std::max(least, kLeastNormalFloat);
 }
 
 RelativeError largestRelativeError(const SparseVolume& reference, const SparseVolume& candidate,

@@ -133,6 +133,9 @@ class HeaderReader {
     if (!count || *count < 0)
       fail("its element " + shownText(words[1], LineEnds::kReplace) + " has the number '" +
            shownText(words[2], LineEnds::kReplace) + "'");
+    for (const Element& other : header_.elements)
+      if (other.name == words[1])
+        fail("its element " + shownText(words[1], LineEnds::kReplace) + " is there twice");
     header_.elements.push_back({words[1], std::uint64_t(*count), {}});
   }
 

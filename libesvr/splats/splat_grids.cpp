@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "core/counted.h"
 #include "core/parallel.h"
 #include "esvr/error.h"
 #include "esvr/field.h"
@@ -101,6 +102,12 @@ class SplatDensity {
     for (auto& [origin, ellipsoids] : chunks)
       field.chunks.push_back({origin, std::move(ellipsoids)});
     return field;
+  }
+
+  /// The smallest and the largest value of a channel of the colors.
+  [[nodiscard]] std::pair<float, float> colorRange(std::size_t channel) const {
+    const auto [least, most] = std::ranges::minmax(splats_.color[channel]);
+    return {least, most};
   }
 
   /// The same with the amplitudes times a channel of the colors.
@@ -201,11 +208,15 @@ VectorGrid colorsOf(const SplatDensity& density, const Field& field, const Volum
                                                              .restrictToBricks = true,
                                                              .masks = grid.volume.active,
                                                              .memory = memory});
+    const auto [least, most] = density.colorRange(channel);
     parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
       const auto sums = volume.brickValues(b);
       const auto weights = grid.volume.brickValues(b);
-      forEachActive(volume.active[b],
-                    [&](int v) { sums[std::size_t(v)] /= weights[std::size_t(v)]; });
+      // A mean is within its range, whatever the sums are rounded to.
+      forEachActive(volume.active[b], [&, least = least, most = most](int v) {
+        sums[std::size_t(v)] =
+            std::clamp(sums[std::size_t(v)] / weights[std::size_t(v)], least, most);
+      });
     });
   }
   return colors;
@@ -226,12 +237,12 @@ SplatGrids makeSplatGrids(const SplatScene& scene, const SplatGridOptions& optio
   const WorkEstimate work =
       estimateWork(field, {.enough = double(options.maxBytes) / volumes, .memory = options.memory});
   requireWithinMemory(volumes * work.bytes(options.memory), options.maxBytes,
-                      "the grids of splats with a voxel size of " + std::to_string(size));
+                      "the grids of splats with a voxel size of " + shortText(size));
   describe("density", GridClass::kFogVolume, size, grids.density.descriptor);
   grids.density.volume = revoxelise(
       field, {.threshold = float(kFaintest / (size * densityScale)), .memory = options.memory});
   if (activeVoxelCount(grids.density.volume) == 0)
-    throw BadInput("the splats are too faint for any active voxel");
+    throw BadInput("its splats are too faint for any active voxel of the size " + shortText(size));
   if (scene.splats.hasColors())
     grids.color = colorsOf(density, field, grids.density, size, options.memory);
   return grids;

@@ -8,6 +8,7 @@
 #include <map>
 #include <sstream>
 
+#include "core/counted.h"
 #include "esvr/error.h"
 #include "esvr/vdb_io.h"
 
@@ -177,7 +178,7 @@ Transform uniformTransform(double voxelSize) {
   try {
     return vdb::fromMap(openvdb::math::UniformScaleMap(voxelSize));
   } catch (const openvdb::Exception& e) {  // OpenVDB treats a scale below about 1e-5 as singular
-    throw UsageError("a voxel size of " + std::to_string(voxelSize) + ": " + e.what());
+    throw UsageError("a voxel size of " + shortText(voxelSize) + ": " + e.what());
   }
 }
 

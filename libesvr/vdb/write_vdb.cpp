@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "esvr/device.h"
 #include "esvr/error.h"
 #include "esvr/grid.h"
 #include "esvr/volume.h"
@@ -223,6 +224,36 @@ class StreamedGrid : public openvdb::Grid<Tree> {
 
 // Grids
 
+/// The number of nodes of a level that the bricks with active voxels have. \param side  of a node, voxels
+template <class Voxels>
+std::size_t nodesOf(const Voxels& voxels, int side) {
+  std::vector<Coord> corners;
+  for (std::size_t b = 0; b < voxels.count(); ++b) {
+    if (voxels.active(b).count() == 0) continue;
+    const Coord brick = voxels.corner(b), corner{brick.x & -side, brick.y & -side, brick.z & -side};
+    if (corners.empty() || corners.back() != corner) corners.push_back(corner);
+  }
+  std::ranges::sort(corners);
+  return std::size_t(std::ranges::distance(corners.begin(), std::ranges::unique(corners).begin()));
+}
+
+/// Checks the memory of a tree. Its upper nodes have 0.3 MB each of floats, and voxels that are far from each other have
+/// nodes of their own, so that a small file may ask for any amount.
+/// \throws MemoryExceeded
+template <class Tree, class Voxels>
+void requireRoomForTree(const Voxels& voxels, const std::string& name, std::uint64_t maxBytes) {
+  using Leaf = typename Tree::LeafNodeType;
+  using Upper = typename Tree::RootNodeType::ChildNodeType;
+  using Lower = typename Upper::ChildNodeType;
+  const auto bytesOf = [&]<class Node>(const Node*) {
+    return double(nodesOf(voxels, int(Node::DIM))) * double(sizeof(Node));
+  };
+  const double bytes = bytesOf(static_cast<const Leaf*>(nullptr)) +
+                       bytesOf(static_cast<const Lower*>(nullptr)) +
+                       bytesOf(static_cast<const Upper*>(nullptr));
+  requireWithinMemory(bytes, maxBytes, "the tree of OpenVDB for grid \"" + shownName(name) + '"');
+}
+
 /// A grid that holds the voxels of all bricks with active ones.
 /// \tparam Voxels  as of StreamedGrid
 template <class Tree, class Voxels>
@@ -304,6 +335,7 @@ template <class Tree>
 GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, LeafVoxels voxels) {
   const auto background = typename Tree::ValueType(source.descriptor.background);
   const bool levelSet = source.descriptor.gridClass == GridClass::kLevelSet;
+  requireRoomForTree<Tree>(NumberVoxels{source.volume}, source.descriptor.name, options.maxBytes);
   // The flood fill of a level set needs the voxels of all leaves.
   if (voxels == LeafVoxels::kWhenWritten && !levelSet)
     return std::make_shared<StreamedGrid<Tree, NumberVoxels>>(NumberVoxels{source.volume},
@@ -328,10 +360,11 @@ GridBase::Ptr makeVectors(const VectorGrid& source, const WriteOptions& options,
                           LeafVoxels voxels) {
   using Vector = typename Tree::ValueType;
   const openvdb::Vec3d background(source.background.data());
-  if (voxels == LeafVoxels::kInMemory)
-    return gridInMemory<Tree>(VectorVoxels{aligned(source.components)}, Vector(background));
-  return std::make_shared<StreamedGrid<Tree, VectorVoxels>>(
-      VectorVoxels{aligned(source.components)}, Vector(background), options.constantTiles);
+  VectorVoxels vectors{aligned(source.components)};
+  requireRoomForTree<Tree>(vectors, source.descriptor.name, options.maxBytes);
+  if (voxels == LeafVoxels::kInMemory) return gridInMemory<Tree>(vectors, Vector(background));
+  return std::make_shared<StreamedGrid<Tree, VectorVoxels>>(std::move(vectors), Vector(background),
+                                                            options.constantTiles);
 }
 
 template <class T>

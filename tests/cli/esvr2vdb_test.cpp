@@ -20,6 +20,7 @@
 namespace esvr::test {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -132,6 +133,12 @@ TEST_F(Vdb2Esvr, warnsOfGridsThatCannotComeBackInPart) {
   succeeded(fitQuickly("--force"));
   EXPECT_THAT(succeeded(esvr2vdb({out(), back(), "--force", "--lod", "1"})).err,
               HasSubstr("grid \"density\" comes back whole: it has a single layer"));
+  writeInput(in(), {{.voxels = cloud(20)}});
+  succeeded(vdb2esvr({in(), out(), "--force", "--count", "2500", "--iterations", "20",
+                      "--representation", "ellipsoids"}));
+  const auto first = succeeded(esvr2vdb({out(), back(), "--force", "--lod", "1"}));
+  EXPECT_THAT(first.err, AllOf(HasSubstr("read "), Not(HasSubstr("comes back whole"))))
+      << "the first of several layers is not the whole grid";
 }
 
 /// Where a surface has a hole, no flood fill can tell the inside from the outside. Leaves with active voxels keep it.

@@ -44,6 +44,19 @@ TEST_F(EsvrRender, ValuesThatPicturesDoNotTellApartHaveAWarning) {
   }
 }
 
+TEST_F(EsvrRender, ACutThatLeavesNothingHasAWarning) {
+  const Box box = activeBox(readGrid(folder_ / "in.vdb", "density").volume);
+  const auto at = [](const char* axis, int place) { return axis + std::to_string(place); };
+  for (const Words& cut :
+       {Words{"--slice", at("x=", box.max.x + 2)}, Words{"--slice", at("z=", box.min.z - 2)},
+        Words{"--clip", "1000,0,0,1001,100,100"}})
+    EXPECT_THAT(succeeded(draw("in.vdb", "cut.png", joined(cut, {"-f"}))).err,
+                HasSubstr("a box outside its active voxels, " + toString(box.min)));
+  for (const int place : {box.max.y, box.min.y})
+    EXPECT_THAT(succeeded(draw("in.vdb", "cut.png", {"-f", "--slice", at("y=", place)})).err,
+                Not(HasSubstr("nothing active is drawn")));
+}
+
 TEST_F(EsvrRender, AGridWithoutASumIsDrawnFromItsVoxelsWithAWarning) {
   const std::string warning = "--between sum has no effect";
   EXPECT_THAT(draw("in.vdb", "vdb.png", {"--between", "sum"}).err, HasSubstr(warning));

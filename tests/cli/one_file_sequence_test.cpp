@@ -3,6 +3,7 @@
 // Sequences of .esvr files are converted back. The frames must have the voxels of single conversions.
 // Frames that are missing or damaged are treated as the options say.
 
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 
@@ -192,7 +193,7 @@ TEST_F(OneFile, isContinuedAfterItStopped) {
   fs::rename(at("in.18.vdb"), at("in.eighteen"));
   writeText(at("in.18.vdb"), "no volume");
   EXPECT_THAT(convert("--on-error stop --threads 1"), Fails(3));
-  EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "whole.esvr"));
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "out.esvr.partial.inputs", "whole.esvr"));
   EXPECT_THAT(convert(), Fails(1, "out.esvr.partial", "--resume"));
   EXPECT_THAT(convert("--resume --frames 2-20"), Fails(2, "has frame 1"));
   for (const char* other :
@@ -206,6 +207,44 @@ TEST_F(OneFile, isContinuedAfterItStopped) {
   EXPECT_THAT(succeeded(convert("--resume")).out, HasSubstr("kept"));
   EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
   EXPECT_THAT(outputs(), ElementsAre("out.esvr", "whole.esvr"));
+}
+
+TEST_F(OneFile, isConvertedAgainFromTheFirstInputOnThatHasChanged) {
+  writeFrames(1, 34);  // two groups, of which the second one holds a frame, and a frame that fails
+  fs::rename(at("in.20.vdb"), at("in.twenty"));  // frame 20 holds frame 19
+  fs::rename(at("in.34.vdb"), at("in.last"));
+  const auto stop = [&] {
+    fs::remove(at("out.esvr.partial"));
+    writeText(at("in.34.vdb"), "no volume");
+    EXPECT_THAT(convert("--on-error stop --threads 1 --missing hold --frames 1-34"), Fails(3));
+    EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "out.esvr.partial.inputs"));
+    fs::copy_file(at("in.last"), at("in.34.vdb"), fs::copy_options::overwrite_existing);
+  };
+  const auto resumed = [&](const std::string& told) {
+    const ProgramRun run = succeeded(convert("--resume --missing hold --frames 1-34"));
+    EXPECT_EQ(run.err.find("is not as it was") != std::string::npos, !told.empty()) << run.err;
+    EXPECT_THAT(run.err, HasSubstr(told));
+    succeeded(convert("--missing hold --frames 1-34", "whole.esvr"));
+    EXPECT_TRUE(bytesOf("out.esvr") == bytesOf("whole.esvr"));
+    EXPECT_THAT(outputs(), ElementsAre("out.esvr", "whole.esvr"));
+    fs::remove(at("out.esvr")), fs::remove(at("whole.esvr"));
+  };
+  stop(), resumed("");
+  stop();
+  writeFrame(18, {{.voxels = softBall({1, 2, 3}, 7.0f)}});
+  resumed("in.18.vdb is not as it was when frame 18 was converted; the frames from 17 on are");
+  stop();
+  const auto changed = fs::last_write_time(at("in.2.vdb"));
+  fs::last_write_time(at("in.2.vdb"),
+                      changed - std::chrono::hours(1));  // another file of the same size
+  resumed("in.2.vdb is not as it was when frame 2 was converted; the frames from 1 on are");
+  stop();
+  fs::rename(at("in.twenty"), at("in.20.vdb"));
+  EXPECT_THAT(convert("--resume --missing hold --frames 1-34"), Fails(2, "has other groups"));
+  fs::rename(at("in.20.vdb"), at("in.twenty"));
+  stop();
+  fs::remove(at("out.esvr.partial.inputs"));
+  resumed("in.1.vdb is not as it was");
 }
 
 TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
@@ -271,7 +310,7 @@ TEST_F(SlowLastFrame, isConvertedAfterTheProgramWasKilled) {
 TEST_F(SlowLastFrame, leavesTheCompleteGroupsWhereItIsInterrupted) {
   EXPECT_THAT(runInterrupted(VDB2ESVR, wordsTo("out.esvr"), kWithoutTheLast),
               Fails(1, "interrupted; 16 of 17 frames are complete, and --resume"));
-  EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial"));
+  EXPECT_THAT(outputs(), ElementsAre("out.esvr.partial", "out.esvr.partial.inputs"));
   makeQuick();
   EXPECT_THAT(succeeded(resumed()).err, HasSubstr("\"kept\""));
   EXPECT_EQ(numbersIn("out.esvr").size(), std::size_t(kGroup + 1));

@@ -108,6 +108,19 @@ TEST_F(SplatFiles, AreConvertedLikeAVdb) {
               ElementsAre("in.esvr", "in.vdb", "out.esvr", "out.ply"));  // no scratch is left
 }
 
+TEST_F(SplatFiles, AreNamedByTheErrorsOfTheirGrids) {
+  succeeded(exportTo("out.ply"));
+  for (const auto& [more, code, why] : std::vector<std::tuple<Words, int, std::string>>{
+           {"--voxel-size 1e-9", 3, "reaches beyond the index space"},
+           {"--voxel-size 1e9", 3, "too faint for any active voxel of the size 1e+09"},
+           {"--max-memory 20KB", 3, "more voxels than there is memory for"}}) {
+    EXPECT_THAT(esvr2vdb(joined({at("out.ply"), at("out.vdb")}, more)),
+                Fails(code, at("out.ply"), why));
+    EXPECT_THAT(vdb2esvr(joined({at("out.ply"), at("out.esvr")}, more)),
+                Fails(code, at("out.ply"), why));
+  }
+}
+
 TEST_F(SplatFiles, AreTakenFromAPipe) {
   succeeded(exportTo("out.ply"));
   succeeded(runShell("cat " + at("out.ply") + " | " + ESVR2VDB + " - " + at("piped.vdb") +

@@ -3,6 +3,7 @@
 // the warnings tell what became of each frame and grid, each thing once.
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 
 #include "cli/conversion.h"
@@ -225,6 +226,23 @@ TEST_F(SequenceFiles, areContinuedWhereTheyAreMissingOnly) {
   EXPECT_THAT(succeeded(convertQuickly("--resume")).out, HasSubstr("kept"));
   EXPECT_EQ(readText(at("out.0002.esvr")), "mine");
   EXPECT_TRUE(isThere("out.0001.esvr") && isThere("out.0003.esvr"));
+}
+
+TEST_F(SequenceFiles, areConvertedAgainWhereTheirInputsHaveChanged) {
+  writeFrames(4);
+  fs::remove(at("in.0003.vdb"));
+  const Words held{"--missing", "hold", "--frames", "1-4"};
+  succeeded(convertQuickly(held));
+  const std::string before = readText(at("out.0003.esvr"));
+  writeText(at("out.0001.esvr"), "mine");
+  writeInput(at("in.0002.vdb"), {{.voxels = softBall({5, 0, 0}, 9.0f)}});
+  const auto later = fs::last_write_time(at("out.0003.esvr")) + std::chrono::hours(1);
+  fs::last_write_time(at("in.0002.vdb"), later);
+  const ProgramRun run = succeeded(convertQuickly(joined(held, {"--resume"})));
+  EXPECT_THAT(run.err, Says("frame 2 is converted again", "in.0002.vdb", "is newer than"));
+  EXPECT_EQ(readText(at("out.0001.esvr")), "mine");
+  EXPECT_NE(readText(at("out.0002.esvr")), before);
+  EXPECT_EQ(readText(at("out.0003.esvr")), readText(at("out.0002.esvr")));
 }
 
 TEST_F(SequenceFiles, thatAreCompleteStayAfterAnInterruption) {

@@ -50,6 +50,11 @@ TEST_F(Vdb2Esvr, endsWithCodeFourWhereThePsnrIsMissedAndWritesTheFile) {
   EXPECT_THAT(checkEsvr(out()), IsEmpty());
 }
 
+TEST_F(Vdb2Esvr, namesTheFileWhereAConversionCannotReachItsGoal) {
+  EXPECT_THAT(vdb2esvr({in(), out(), "--size", "20"}), Fails(2, in(), "the size allows 20"));
+  EXPECT_THAT(vdb2esvr({in(), out(), "--size", "180"}), Fails(2, in(), "grid 'density'", "allows"));
+}
+
 TEST_F(Vdb2Esvr, keepsToTheSizeAskedFor) {
   succeeded(vdb2esvr(
       {in(), out(), "--size", "1.5KB", "--iterations", "60", "--representation", "ellipsoids"}));

@@ -264,6 +264,10 @@ INSTANTIATE_TEST_SUITE_P(
         PeakCase{"constant", {-7.0f, -7.0f}, 0.0, 7.0, false},
         PeakCase{"constant beside its background", {7.0f, 7.0f}, 6.0, 7.0, false},
         PeakCase{"zeros", {0.0f, 0.0f}, 0.0, 1.0, false},
+        PeakCase{
+            "constant but for roundings", {293.15f, 293.15006f}, 0.0, double(293.15006f), false},
+        PeakCase{"a negative one", {-1.0f, -0.9999999f}, 0.0, 1.0, false},
+        PeakCase{"a step of eight roundings", {1.0f, 1.0000010f}, 0.0, 0x1p-20, true},
         PeakCase{"extreme", {-3e38f, 3e38f}, 0.0, double(3e38f), false}));
 
 TEST(SetBackground, ChangesInactiveVoxelsOnly) {

@@ -283,6 +283,22 @@ TEST(FarBackground, KeepsABoundAndASizeAndTheNumberOfEllipsoids) {
   expectNothingBetween(volume, fitted.grid);
 }
 
+// A quality relative to the range of such values would ask for their roundings.
+TEST(Constant, TakesNoBytesForItsRoundings) {
+  std::uint32_t bits = 1;
+  const SparseVolume volume = test::volumeOf({}, 3, 0.0f, [&](Coord) {
+    bits = bits * 1664525u + 1013904223u;
+    return std::nextafter(293.15f, bits & 0x10000 ? 0.0f : 1000.0f);
+  });
+  for (const Goal& goal : std::vector<Goal>{PresetGoal{}, PsnrGoal{40.0}, PictureGoal{40.0}}) {
+    const Conversion made = converted(volume, goal, Representation::kAuto);
+    EXPECT_LT(bytesAdded(made.grid), 400u);
+    EXPECT_LT(compareVolumes(volume, decodeGrid(made.grid)).maxError, 1e-4);
+  }
+  EXPECT_GT(bytesAdded(converted(volume, PsnrGoal{200.0}, Representation::kAuto).grid), 1000u);
+  EXPECT_GE(psnrOf(volume, converted(volume, PsnrGoal{40.0}).grid), 40.0) << "as ellipsoids";
+}
+
 TEST(FarBackground, IsStoredAsItIsWithoutLoss) {
   const SparseVolume volume = pressureVolume();
   const Conversion made = converted(volume, LosslessGoal{}, Representation::kVoxels);

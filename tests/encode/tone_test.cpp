@@ -197,6 +197,14 @@ TEST(Tone, KeepsTheTotalMass) {
   }
 }
 
+TEST(Tone, AndMassKeepValuesNearTheLargestFloatFinite) {
+  const SparseVolume volume = test::volumeOf({}, 5, 0.0f, [](Coord v) {
+    return float(3.3e38 * std::sin(0.4 * v.x) * std::cos(0.3 * v.y) * std::sin(0.2 * v.z));
+  });
+  for (const Goal& goal : std::vector<Goal>{PresetGoal{}, PictureGoal{38.0}, SizeGoal{900}})
+    EXPECT_FALSE(hasNonFinite(decodeGrid(shortlyFitted(volume, {.goal = goal}).grid)));
+}
+
 /// The largest error relative to max(|v|, floor).
 double relativeError(const SparseVolume& volume, const SparseVolume& decoded, double floor) {
   double largest = 0.0;
@@ -249,8 +257,25 @@ TEST(RelativeBound, OfTinyAndHugeValues) {
   *std::ranges::find_if(volume.values, [](float v) { return v != 0.0f; }) = 1e-45f;
   for (const std::optional<double> floor : {std::optional<double>{}, {1e-30}, {1e30}}) {
     const Conversion made = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.01, floor}});
-    EXPECT_LE(relativeError(volume, decodeGrid(made.grid), floor.value_or(1e-45)), 0.01);
+    EXPECT_LE(relativeError(volume, decodeGrid(made.grid), floor.value_or(0x1p-126)), 0.01);
   }
+}
+
+// The smallest floats have few digits, so that no curve reaches down to them, and exact voxels would take several times
+// the bytes.
+TEST(RelativeBound, IsThatOfNormalFloatsWhereThereAreSome) {
+  SparseVolume volume = smoke();
+  const Conversion usual = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.01, 0x1p-126}});
+  std::size_t n = 0;
+  for (float& value : volume.values)
+    if (value != 0.0f && n++ % 50 == 0) value *= 0x1p-140f;
+  const Conversion made = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.01}});
+  EXPECT_TRUE(made.grid.tone.isOn());
+  EXPECT_LE(relativeError(volume, decodeGrid(made.grid), 0x1p-126), 0.01);
+  EXPECT_LT(bytesAdded(made.grid), 2 * bytesAdded(usual.grid)) << "although a fiftieth is noise";
+  for (float& value : volume.values) value *= value < 1e-30f ? 1.0f : 0x1p-140f;
+  const Conversion small = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.01}});
+  EXPECT_LE(relativeError(volume, decodeGrid(small.grid), 0x1p-149), 0.01) << "none is normal";
 }
 
 TEST(RelativeBound, WithABackgroundIsThatOfTheSmallestValue) {
@@ -260,6 +285,13 @@ TEST(RelativeBound, WithABackgroundIsThatOfTheSmallestValue) {
   const Conversion made = shortlyFitted(volume, {.goal = RelativeBoundGoal{0.001}});
   EXPECT_FALSE(made.grid.tone.isOn());
   EXPECT_LE(relativeError(volume, decodeGrid(made.grid), 1.0), 0.001);
+}
+
+TEST(Quality, IsFiniteAndNotNegative) {
+  const SparseVolume volume = smoke();
+  for (const double psnr : {-1.0, double(NAN), double(INFINITY)})
+    for (const Goal& goal : {Goal(PsnrGoal{psnr}), Goal(PictureGoal{psnr})})
+      EXPECT_THROW((void)convertVolume({fog(), volume}, {.goal = goal}), UsageError) << psnr;
 }
 
 TEST(RelativeBound, RefusesWhatIsNoBound) {

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <boost/program_options/value_semantic.hpp>
 
+#include <cmath>
 #include <csignal>
 #include <new>
 #include <sstream>
@@ -37,6 +38,18 @@ using testing::internal::GetCapturedStderr;
 using testing::internal::GetCapturedStdout;
 
 // Values.
+
+TEST(Numbers, HaveAsManyDigitsAsItTakesToTellThemApart) {
+  using testing::Pair;
+  EXPECT_THAT(decibelsApart(39.5, 40.0), Pair("39.50", "40.00"));
+  EXPECT_THAT(decibelsApart(39.9996, 40.0), Pair("39.9996", "40.0000"));
+  EXPECT_THAT(decibelsApart(40.0, 40.0), Pair("40.00", "40.00"));
+  EXPECT_THAT(decibelsApart(40.0, std::nextafter(40.0, 50.0)),
+              Pair("40.00000000000000", "40.00000000000001"));
+  EXPECT_THAT(decibelsApart(40.0, INFINITY), Pair("40.00", "exact"));
+  EXPECT_THAT(shortNumbersApart(0.01000001, 0.01), Pair("0.01000001", "0.01"));
+  EXPECT_THAT(shortNumbersApart(1e-30, 0.25), Pair("1e-30", "0.25"));
+}
 
 TEST(NumberList, ReadsAsManyNumbersAsAskedFor) {
   EXPECT_THAT(parseNumbers("eye", "1,-2.5,3e2", 3), ElementsAre(1.0, -2.5, 300.0));

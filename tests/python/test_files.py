@@ -49,8 +49,11 @@ def test_volumes_share_what_they_have_in_common(tmp_path, ball):
 
 
 def test_what_is_amiss_is_told(tmp_path, source, ball):
-    with pytest.raises(esvr.UsageError, match="without any fitted grid"):
+    with pytest.raises(esvr.UsageError, match=f"{source}: .*without any fitted grid"):
         esvr.convert(source, size=200)
+    for psnr in (-1, float("nan")):
+        with pytest.raises(esvr.UsageError, match="finite and not below 0 dB"):
+            esvr.fit(esvr.Volume.from_numpy(ball), psnr=psnr)
     with pytest.raises(esvr.BadInput, match="missing.vdb"):
         esvr.convert(tmp_path / "missing.vdb")
     with pytest.raises(esvr.UsageError, match="exclude"):

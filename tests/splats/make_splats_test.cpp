@@ -418,6 +418,17 @@ TEST(SplatGrids, HaveTheSumOfGaussiansAndTheirMeanColor) {
   EXPECT_EQ(grids.density.descriptor.gridClass, GridClass::kFogVolume);
 }
 
+TEST(SplatGrids, HaveTheColorItselfWhereAllSplatsHaveIt) {
+  SplatScene scene = randomScene(12);
+  for (auto& channel : scene.splats.color) std::ranges::fill(channel, 0.7f);
+  const SplatGrids grids = makeSplatGrids(scene, {.voxelSize = 0.7});
+  for (const SparseVolume& channel : grids.color->components) {
+    const ValueRange range = activeRange(channel);
+    EXPECT_EQ(range.min, 0.7f);
+    EXPECT_EQ(range.max, 0.7f);
+  }
+}
+
 double integralOf(const SplatGrids& grids) {
   double sum = 0.0;
   for (const float v : grids.density.volume.values) sum += double(v);

@@ -428,6 +428,8 @@ TEST(ReadSplats, RefusesWhatIsNoFileOfSplatsAndSaysWhy) {
   expectRefusal(replaced("opacity", "opaque"), "no property opacity");
   expectRefusal(replaced("f_dc_1", "f_dc_7"), "some of f_dc_0");
   expectRefusal(replaced("f_dc_1", "x"), "twice");
+  expectRefusal(replaced("end_header", "element vertex 1\nproperty float x\nend_header"),
+                "element vertex is there twice");
   expectRefusal(replaced("property float x", "property vec3 x"), "unknown type");
   expectRefusal(replaced("vertex 1", "vertex 2"), "too short");
   expectRefusal(replaced("vertex 1", "vertex 9000000000000000000"), "too short");

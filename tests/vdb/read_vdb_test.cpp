@@ -301,12 +301,16 @@ TEST_F(Voxels, DoublesSayWhatFloatsLose) {
   const Narrowing lost = saveAndRead(source).narrowing;
   EXPECT_EQ(lost.errors.count(), 2);
   EXPECT_EQ(lost.largest(), double(0.1f) - 0.1);
-  EXPECT_EQ(lost.relative, 1.0) << "nothing is left of 1e-50";
+  EXPECT_DOUBLE_EQ(lost.relative, lost.largest() / 0.1) << "1e-50 is not a normal float";
   EXPECT_EQ(lost.min, 1e-50);
   EXPECT_EQ(lost.max, 0.25);
   EXPECT_EQ(lost.relativeAbove(0.5), 2.0 * lost.largest());
   EXPECT_EQ(between(lost, lost).largest(), 0.0);
   EXPECT_EQ(between(lost, {}).largest(), lost.largest());
+  EXPECT_DOUBLE_EQ(lost.relativeAbove({}), lost.relative);
+  Narrowing denormal;
+  denormal.add(1e-42, 1e-42f, {});
+  EXPECT_EQ(denormal.relativeAbove({}), 1.0) << "no normal float is there";
 }
 
 TEST_F(Voxels, DoublesThatAreAllTooSmallForFloatAreRefused) {

@@ -57,6 +57,24 @@ TEST_F(Write, InactiveVoxelsHoldTheBackground) {
   EXPECT_EQ(back->tree().getValue({-3, 5, 100}), 2.0f);
 }
 
+// Nodes of the tree take 0.3 MB for each of these voxels.
+TEST_F(Write, VoxelsFarFromEachOtherKeepToTheMemory) {
+  std::vector<test::Voxel> voxels;
+  for (int i = 0; i < 30; ++i) voxels.push_back({{5000 * i, -7000 * i, 0}, 1.0f});
+  const VolumeGrid far = test::gridOf("far", voxels);
+  VectorGrid vectors;
+  vectors.descriptor.name = "vectors";
+  for (SparseVolume& component : vectors.components) component = far.volume;
+  WriteOptions options{.overwrite = true, .maxBytes = 5'000'000};
+  for (const GridToWrite grid : {GridToWrite(&far), GridToWrite(&vectors)})
+    EXPECT_THAT(
+        [&] { writeGrids(path(), {}, std::span(&grid, 1), options); },
+        test::ThrowsSaying<MemoryExceeded>("the tree of OpenVDB for grid \"", "5 MB are allowed"));
+  options.maxBytes = 50'000'000;
+  writeGrids(path(), {}, std::span(&far, 1), options);
+  EXPECT_EQ(inspectVdb(path()).grids.at(0).activeVoxels, 30u);
+}
+
 TEST_F(Write, ConstantLeavesBecomeTilesUnlessToldOtherwise) {
   auto voxels = fullBrick({8, 16, -8}, 0.75f);
   voxels.push_back({{0, 0, 0}, 2.0f});

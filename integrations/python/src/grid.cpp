@@ -365,7 +365,11 @@ File convertSource(const ConvertedSource& given, const ConvertOptions& options, 
   ConvertedFile made = reporting(options, progress, [&](const ConvertOptions& common) {
     FileOptions ofFile{.convert = common};
     if (const auto* size = std::get_if<SizeGoal>(&common.goal)) ofFile.size = size->bytes;
-    return convertGrids(sourceOf(given, isLossless(common), nonFinite), ofFile);
+    const auto* path = std::get_if<std::filesystem::path>(&given);
+    const auto convert = [&] {
+      return convertGrids(sourceOf(given, isLossless(common), nonFinite), ofFile);
+    };
+    return path ? namingFile(path->string(), convert) : convert();
   });
   if (made.interrupted) throw Cancelled();
   if (std::holds_alternative<PsnrGoal>(options.goal))  // a preset is as good as the grids allow
@@ -403,8 +407,9 @@ constexpr const char* kGoalText =
     "has this PSNR (Metrics.psnr_t50), of a volume that is looked through; max_relative_error: a\n"
     "bound on the error of every voxel relative to its magnitude, such as 0.01, or to "
     "relative_floor\n"
-    "where that is larger (default: the smallest magnitude above 0). The default is the quality\n"
-    "of the preset ('draft', 'standard' or 'high').\n\n"
+    "where that is larger (default: the smallest magnitude above 0, at least 1.2e-38). The "
+    "default\n"
+    "is the quality of the preset ('draft', 'standard' or 'high').\n\n"
     "measure: what the quality of a preset and of a size means. 'auto': what is seen of a volume "
     "that\n"
     "is looked through, the surface of a level set that is no narrow band, and the PSNR of values\n"

@@ -69,8 +69,10 @@ ReadResult readSplatsAsGrids(const std::filesystem::path& path, std::optional<do
   return interruptible([&]() -> ReadResult {
     const std::uint64_t limit = memoryLimit(maxMemory);
     const SplatFile file = readSplats(path, {.maxBytes = limit, .up = upOf(up)});
-    SplatGrids grids = makeSplatGrids(
-        file.scene, {.voxelSize = voxelSize, .densityScale = densityScale, .maxBytes = limit});
+    SplatGrids grids = namingFile(path.string(), [&] {
+      return makeSplatGrids(
+          file.scene, {.voxelSize = voxelSize, .densityScale = densityScale, .maxBytes = limit});
+    });
     const auto asVolume = [](VolumeGrid grid) {
       return Volume{std::make_shared<const VolumeGrid>(std::move(grid))};
     };

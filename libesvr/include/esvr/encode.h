@@ -77,8 +77,8 @@ struct BoundGoal {
 /// values; otherwise all have the bound that suits the smallest value.
 struct RelativeBoundGoal {
   double share = 0.0;  ///< above 0 and below 1
-  /// Magnitude below which the bound no longer falls, above 0. Default: the smallest magnitude above 0 of the
-  /// active values.
+  /// Magnitude below which the bound no longer falls, above 0. Default: leastMagnitude() of the volume
+  /// (metrics.h).
   std::optional<double> floor{};
   friend auto operator<=>(const RelativeBoundGoal&, const RelativeBoundGoal&) = default;
 };

@@ -33,6 +33,10 @@ class Error : public std::runtime_error {
         text_.replace(at + 1, stored.size(), unique);
     }
   }
+  /// Puts the name of a file before a text that does not have it.
+  void nameFile(const std::string& path) {
+    if (text_.find(path) == std::string::npos) text_ = path + ": " + text_;
+  }
 
  private:
   ErrorKind kind_;
@@ -71,5 +75,23 @@ struct MemoryExceeded : Error {
 struct Cancelled : Error {
   Cancelled() : Error(ErrorKind::kRuntime, "cancelled") {}
 };
+
+/// Runs what works on the content of a file. Its errors name the file, which functions on volumes do not know, but for those of
+/// a device and of an interrupted run.
+template <typename Action>
+auto namingFile(const std::string& path, const Action& action) {
+  try {
+    return action();
+  } catch (UsageError& error) {
+    error.nameFile(path);
+    throw;
+  } catch (BadInput& error) {
+    error.nameFile(path);
+    throw;
+  } catch (MemoryExceeded& error) {
+    error.nameFile(path);
+    throw;
+  }
+}
 
 }  // namespace esvr

@@ -206,11 +206,14 @@ class InactiveValues {
 /// For messages: "2 inactive values (5, first at (1, 2, 3))", "9 inactive values (-2.5 to -2, ...)".
 [[nodiscard]] std::string toText(const InactiveValues& values);
 
+/// Smaller floats have fewer digits.
+inline constexpr double kLeastNormalFloat = 0x1p-126;
+
 /// What active doubles lose because a volume holds floats; nothing for the values of other grids.
 struct Narrowing {
   InactiveValues errors;  ///< value - float(value) at the voxels where it is not 0
   double squares = 0.0;   ///< sum of the squared errors
-  double relative = 0.0;  ///< largest error relative to its value
+  double relative = 0.0;  ///< largest error relative to its value, at least to kLeastNormalFloat
   double min = std::numeric_limits<double>::infinity();  ///< of the doubles
   double max = -min;
 
@@ -220,8 +223,11 @@ struct Narrowing {
     if (double(rounded) != value) addError(value, value - double(rounded), at);
   }
   [[nodiscard]] double largest() const { return std::max(-errors.min(), errors.max()); }
-  /// At least the largest error relative to magnitudes, smaller ones of which count as `floor`.
+  /// At least the largest error relative to magnitudes, smaller ones of which count as `floor` (nothing: as
+  /// leastMagnitude() in metrics.h, if they are not all below kLeastNormalFloat).
   [[nodiscard]] double relativeAbove(const std::optional<double>& floor) const {
+    constexpr double kUnknown = 1.0;
+    if (errors.count() > 0 && !floor && std::max(-min, max) < kLeastNormalFloat) return kUnknown;
     return floor ? std::min(relative, largest() / *floor) : relative;
   }
 

@@ -131,7 +131,8 @@ struct RelativeError {
                                                  const SparseVolume& candidate,
                                                  std::optional<double> floor);
 
-/// The smallest magnitude above 0 of the active values; infinity if all are 0.
+/// The smallest magnitude above 0 of the active values, but not below 2^-126 (1.2e-38) if one of them is not: smaller
+/// floats have fewer digits, and many programs take them for 0. Infinity if all are 0.
 [[nodiscard]] double leastMagnitude(const SparseVolume& volume);
 
 /// 10 log10(peak^2 / mse) in dB; +inf for mse = 0.

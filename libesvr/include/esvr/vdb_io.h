@@ -177,6 +177,8 @@ struct WriteOptions {
   /// of a small grid all remain, and one of a larger grid, because Blender draws nothing of a grid
   /// that has tiles only.
   bool constantTiles = true;
+  /// Memory that the tree of a grid of a .vdb file may take, beside its voxels. Voxels far from each other take 0.3 MB each.
+  std::uint64_t maxBytes = std::numeric_limits<std::uint64_t>::max();
 };
 
 /// Writes grids to a .vdb (with Blosc and active masks) or .nvdb file. The data go to a temporary

@@ -288,6 +288,10 @@ struct ValueRange {
 /// remain, even if no voxel of them is active any more.
 void dropNonFinite(SparseVolume& volume);
 
+/// True if values are equal but for the last two bits of float32, as those of a constant that was computed in several
+/// ways. Their range says nothing of them then.
+[[nodiscard]] bool isConstant(const ValueRange& values);
+
 /// The interval over which the values of a grid spread, active or not.
 struct ValueSpan {
   double low = 0.0, high = 0.0;
@@ -302,7 +306,7 @@ struct ValueSpan {
 /// interval is long, as the background 0 of a pressure between 101,325 and 101,365 Pa, or of a
 /// temperature between 280 and 310 K. Such a background says only where there is no value, and the
 /// values would be lost in a span that contains it. The background of an 8-bit scan whose active
-/// values begin at a threshold is not far, nor is that of a grid with one active value.
+/// values begin at a threshold is not far, nor is that of a grid with one active value (isConstant).
 /// \param active  range of the active values, as from activeRange
 [[nodiscard]] ValueSpan spanOf(const ValueRange& active, double background);
 
@@ -316,7 +320,7 @@ struct ValueSpan {
 ///  - for values of both signs, the largest magnitude. A velocity from -v to v then has the peak v,
 ///    which does not depend on the direction of the axes, and data of both signs have the quality
 ///    that those of one sign have;
-///  - if all active values are equal, their magnitude, or 1 if they are 0.
+///  - if all active values are equal (isConstant), their magnitude, or 1 if they are 0.
 /// \param active  range of the active values, as from activeRange
 [[nodiscard]] double peakOf(const ValueRange& active, double background);
 
