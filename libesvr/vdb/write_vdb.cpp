@@ -238,7 +238,8 @@ std::size_t nodesOf(const Voxels& voxels, int side) {
 }
 
 /// Checks the memory of a tree. Its upper nodes have 0.3 MB each of floats, and voxels that are far from each other have
-/// nodes of their own, so that a small file may ask for any amount.
+/// nodes of their own, so that a small file may ask for any amount. A small tree is like the memory of the program itself,
+/// for which no limit accounts.
 /// \throws MemoryExceeded
 template <class Tree, class Voxels>
 void requireRoomForTree(const Voxels& voxels, const std::string& name, std::uint64_t maxBytes) {
@@ -251,7 +252,9 @@ void requireRoomForTree(const Voxels& voxels, const std::string& name, std::uint
   const double bytes = bytesOf(static_cast<const Leaf*>(nullptr)) +
                        bytesOf(static_cast<const Lower*>(nullptr)) +
                        bytesOf(static_cast<const Upper*>(nullptr));
-  requireWithinMemory(bytes, maxBytes, "the tree of OpenVDB for grid \"" + shownName(name) + '"');
+  constexpr double kSmall = 4e6;
+  if (bytes > kSmall)
+    requireWithinMemory(bytes, maxBytes, "the tree of OpenVDB for grid \"" + shownName(name) + '"');
 }
 
 /// A grid that holds the voxels of all bricks with active ones.
