@@ -195,7 +195,7 @@ double errorOfRank(std::span<const BrickPair> pairs, std::uint64_t rank) {
     if (counts[digit] > kFew) continue;
     std::vector<std::uint64_t> keys = keysWith(pairs, prefix);
     const auto at = keys.begin() + std::ptrdiff_t(rank - 1);
-    std::ranges::nth_element(keys, at);
+    std::nth_element(keys.begin(), at, keys.end());
     return std::bit_cast<double>(*at);
   }
   return std::bit_cast<double>(prefix.bits);
