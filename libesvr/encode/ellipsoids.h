@@ -70,8 +70,8 @@ struct Margin {
 };
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
-/// Plan::wholeFits whole fits are made (up to four short ones if few ellipsoids suffice; for a size up to five, if
-/// the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
+/// Plan::wholeFits whole fits are made (up to four if few ellipsoids suffice, or while each is far above the PSNR; for a size
+/// up to five, if the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
 /// decide about their signs, and one that shows that averages do not suffice. A frame of a sequence continues the ellipsoids
 /// of the frame before instead of making short fits.
 class EllipsoidSearch {
@@ -140,6 +140,7 @@ class EllipsoidSearch {
   [[nodiscard]] double capped(double count) const;
   [[nodiscard]] double nextCount() const;
   [[nodiscard]] bool isEnough() const;
+  [[nodiscard]] int mostWholeFits() const;
   [[nodiscard]] std::optional<Conversion> runToPsnr();
   [[nodiscard]] std::optional<Conversion> runToSize();
   [[nodiscard]] std::optional<CompactResult> filled(const Attempt& attempt);

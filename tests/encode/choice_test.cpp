@@ -90,6 +90,26 @@ TEST(ChoiceForAPsnr, ThatIsCancelledBeforeItBeginsHasNoResult) {
   }
 }
 
+/// A ball with a soft border, which a dozen ellipsoids approximate.
+SparseVolume ballVolume() {
+  return test::volumeOf({}, 8, 0.0f, [](Coord v) {
+    const double r = std::hypot(v.x - 31.5, v.y - 31.5, v.z - 31.5) / 32.0;
+    const double value = 0.5 - 0.5 * std::tanh((r - 0.6) / 0.15);
+    return value > 0.01 ? float(value) : 0.0f;
+  });
+}
+
+/// No voxels show that thousands of ellipsoids, with which the search begins, are far too many.
+TEST(ChoiceForAPsnr, SlowOfEllipsoidsAloneTakesAFew) {
+  const SparseVolume volume = ballVolume();
+  ConvertOptions options;
+  options.goal = PsnrGoal{50.0};
+  options.representation = Representation::kEllipsoids;
+  const Conversion conversion = convertVolume({{}, volume}, options);
+  EXPECT_GE(psnrOver(volume, conversion), 50.0);
+  EXPECT_LT(conversion.grid.field.ellipsoidCount(), 200u);
+}
+
 TEST(ChoiceForASize, TakesVoxelsOfNoise) {
   const SparseVolume volume = test::noiseVolume(2);
   const Conversion conversion = choose(volume, SizeGoal{3000});
@@ -143,15 +163,6 @@ TEST(ChoiceForAPreset, SlowHasItsQualityOverTheActiveVoxels) {
     EXPECT_GT(bytesAdded(conversion.grid), before);
     before = bytesAdded(conversion.grid);
   }
-}
-
-/// A ball with a soft border, which a dozen ellipsoids approximate.
-SparseVolume ballVolume() {
-  return test::volumeOf({}, 8, 0.0f, [](Coord v) {
-    const double r = std::hypot(v.x - 31.5, v.y - 31.5, v.z - 31.5) / 32.0;
-    const double value = 0.5 - 0.5 * std::tanh((r - 0.6) / 0.15);
-    return value > 0.01 ? float(value) : 0.0f;
-  });
 }
 
 TEST(ChoiceForAPreset, SlowTakesAFewEllipsoidsThoughTheFirstFitHasManyMore) {
