@@ -167,6 +167,10 @@ constexpr double kSignsGain = 0.5;
 // saturate.
 constexpr double kContinuedShare = 0.4, kContinuedFrameShare = 0.3, kSizedShare = 0.6;
 
+/// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the bytes of a short one,
+/// which for fewer bytes is worth less time in proportion (hydrogen_atom: 560 bytes in 12 CPU seconds with all iterations).
+constexpr double kBytesOfWholeFit = 4096.0;
+
 /// Of values (Lab, "More ellipsoids or more bits"), and of tones: smoke1 of 25 KB has 34.8 dB of what is
 /// seen with these, and 34.5 with those of values.
 constexpr Rounding kRounding{0.9, 2.5, 1.0}, kTonedRounding{0.5, 1.2, 1.65};
@@ -186,6 +190,9 @@ constexpr double kNear = kMostGrowth * kGrownFrom;
 constexpr int kMostDrafts = 3;
 /// Whole fits of ellipsoids that take at most half of kBytesOfWholeFit, each of which has at most half of the iterations.
 constexpr int kMostSmallFits = 4;
+/// A fit for a PSNR is far above it where it exceeds the largest margin by this factor. By the usual growth, it has at least
+/// twice the ellipsoids that it needs.
+constexpr double kFarAbove = 2.0;
 /// Largest number of ellipsoids of the first of them. Where it is farther from the PSNR than kFar times its number of
 /// ellipsoids, one with as many times fewer shows the slope.
 constexpr double kMostOfFirstDraft = 6000.0, kFar = 4.0;
@@ -231,6 +238,8 @@ double countFor(const std::vector<FitPoint>& fits, double psnr, double slope) {
   }
   const bool isBetween = low && high && low->count < high->count && std::isfinite(low->psnr) &&
                          std::isfinite(high->psnr);
+  // Where all fits have far more ellipsoids than they need, one of fewer may be the better one (diffuse-scalar).
+  if (!low || !high) nearest = low ? low : high;
   if (!isBetween) return nearest->count * std::exp2((psnr - nearest->psnr) / slope);
   const double share = (psnr - low->psnr) / (high->psnr - low->psnr);
   return low->count * std::pow(high->count / low->count, share);
@@ -473,7 +482,8 @@ double EllipsoidSearch::nextCount() const {
   for (FitPoint& fit : fits) fit.psnr += above;
   for (const Attempt& a : attempts_) fits.push_back(pointOf(a));
   const double wanted = attempts_.empty() ? margin_.aim : 0.5 * (margin_.min + margin_.max);
-  const double count = countFor(fits, *goal_.psnr + wanted, slope_), near = double(draft_->asked);
+  const double count = countFor(fits, *goal_.psnr + wanted, slope_),
+               near = double(attempts_.empty() ? draft_->asked : attempts_.back().asked);
   return std::clamp(count, near / kMaxGrowth, near * kMaxGrowth);
 }
 
@@ -684,6 +694,13 @@ double EllipsoidSearch::expectedPsnr() const {
          rounding_.usualLoss * rounding_.factor;
 }
 
+double EllipsoidSearch::expectedWork() const {
+  const SparseVolume& fitted = job_.averages ? *job_.averages : job_.input.source;
+  const std::uint32_t iterations =
+      startFor(capped(nextCount())) ? shareOfWhole(kContinuedShare) : plan_.wholeIterations;
+  return double(iterations) * double(fitted.brickCount());
+}
+
 bool EllipsoidSearch::mayReach(double psnr) const {
   return draft_->cancelled() || expectedPsnr() + kUncertainty >= psnr;
 }
@@ -725,11 +742,19 @@ bool EllipsoidSearch::isEnough() const {
   return over <= margin_.max || !plan_.improves;
 }
 
+/// The number of whole fits after which the search ends. The fits that follow one far above the PSNR have a fraction of its
+/// ellipsoids, and take a fraction of its time and of its bytes.
+int EllipsoidSearch::mostWholeFits() const {
+  const bool isFarAbove =
+      !attempts_.empty() && attempts_.back().psnr - *goal_.psnr > kFarAbove * margin_.max;
+  return isFarAbove ? std::max(plan_.wholeFits, kMostSmallFits) : plan_.wholeFits;
+}
+
 /// A short fit that has all iterations of a whole one is the first of the whole fits.
 std::optional<Conversion> EllipsoidSearch::runToPsnr() {
   if (!draft_->cancelled() && attempts_.empty() && plan_.wholeIterations <= plan_.shortIterations)
     attempts_.push_back(*draft_);
-  for (int fits = 0; fits < plan_.wholeFits && !draft_->cancelled() && !isEnough(); ++fits) {
+  for (int fits = 0; fits < mostWholeFits() && !draft_->cancelled() && !isEnough(); ++fits) {
     const bool isMissed = !attempts_.empty() && leastAfterMisses() > 1.0;
     if (isMissed && job_.averages && shareOfAveraging(attempts_.back()) > kMostOfAveraging)
       fitVoxels();

@@ -15,9 +15,6 @@ namespace esvr::encode {
 inline constexpr double kUsualBytesEach = 7.5, kLeastBytesEach = 4.5;
 /// dB by which a whole fit may exceed its forecast (dragon, neuron_rp140212).
 inline constexpr double kUncertainty = 1.0;
-/// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the bytes of a short one,
-/// which for fewer bytes is worth less time in proportion (hydrogen_atom: 560 bytes in 12 CPU seconds with all iterations).
-inline constexpr double kBytesOfWholeFit = 4096.0;
 
 /// The loss by quantising, dB of PSNR over the box, at which further bytes gain as much in more ellipsoids as in
 /// more bits, the one above which fewer ellipsoids are better, and the loss of quality for each dB of it.
@@ -70,8 +67,8 @@ struct Margin {
 };
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
-/// Plan::wholeFits whole fits are made (up to four short ones if few ellipsoids suffice; for a size up to five, if
-/// the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
+/// Plan::wholeFits whole fits are made (up to four if few ellipsoids suffice, or while each is far above the PSNR; for a size
+/// up to five, if the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
 /// decide about their signs, and one that shows that averages do not suffice. A frame of a sequence continues the ellipsoids
 /// of the frame before instead of making short fits.
 class EllipsoidSearch {
@@ -92,6 +89,8 @@ class EllipsoidSearch {
   /// The PSNR (for a size) or the bytes (for a PSNR) to expect of the whole fits.
   [[nodiscard]] double expectedPsnr() const;
   [[nodiscard]] std::uint64_t expectedBytes() const { return expectedBytes_; }
+  /// For a PSNR: the iterations of the first whole fit times the bricks that it passes over, after the short fits.
+  [[nodiscard]] double expectedWork() const;
   /// About the bytes for a PSNR by what Job::scout shows, before the short fits; nothing if there is no scout.
   [[nodiscard]] std::optional<double> scoutedBytes() const;
 
@@ -140,6 +139,7 @@ class EllipsoidSearch {
   [[nodiscard]] double capped(double count) const;
   [[nodiscard]] double nextCount() const;
   [[nodiscard]] bool isEnough() const;
+  [[nodiscard]] int mostWholeFits() const;
   [[nodiscard]] std::optional<Conversion> runToPsnr();
   [[nodiscard]] std::optional<Conversion> runToSize();
   [[nodiscard]] std::optional<CompactResult> filled(const Attempt& attempt);

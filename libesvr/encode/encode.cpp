@@ -64,7 +64,7 @@ class Choice {
       : job_(job), wanted_(representationOf(job)), goal_(goal), plan_(planOf(job)) {}
 
   /// \param share        share of the voxels' bytes that ellipsoids must be expected to stay below
-  /// \param smallEnough  bytes of voxels below which no ellipsoids are tried
+  /// \param smallEnough  bytes of voxels below which no ellipsoids are tried, unless they are far smaller
   Conversion forPsnr(double share, std::uint64_t smallEnough) {
     if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
     if (isConstant(job_.input.source) || isBeyondFloats())
@@ -81,7 +81,8 @@ class Choice {
     const auto below = std::uint64_t(margin * share * double(expected->bytes));
     figures_ = Candidate{ellipsoids_->expectedBytes(), *goal_.psnr, true, seconds_};
     if (!ellipsoids_->mayStayBelow(below) ||
-        expected->bytes < figures_->bytes + leastSaving(wholeIterations(figures_->bytes)))
+        voxels_->likelyBytes(*expected) <
+            figures_->bytes + leastSaving(ellipsoids_->expectedWork()))
       return completeVoxels();
     completeEllipsoids();
     const bool reached = conversion_ && *figures_->psnr >= *goal_.psnr;
@@ -141,15 +142,10 @@ class Choice {
     return *goal_.psnr > kMostOfFloats && !seesPictures(job_);
   }
 
-  /// Bytes that fits of so many iterations must save to be worth their time, which on a GPU is short.
-  std::uint64_t leastSaving(double iterations) const {
+  /// Bytes that a fit of so much work must save to be worth its time, which on a GPU is short.
+  std::uint64_t leastSaving(double work) const {
     if (isOnGpu()) return 0;
-    const double work = iterations * double(job_.input.source.brickCount());
     return std::uint64_t(kBytesPerWork * work / effortFactor(job_.options.effort));
-  }
-
-  double wholeIterations(std::uint64_t bytes) const {
-    return plan_.wholeIterations * std::min(1.0, double(bytes) / kBytesOfWholeFit);
   }
 
   bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
@@ -181,6 +177,9 @@ class Choice {
   std::optional<Candidate> estimateAndDraft(double share, std::uint64_t smallEnough) {
     const bool onGpu = isOnGpu() && activeVoxelCount(job_.input.source) >= kMinDraftedVoxels;
     std::optional<Candidate> expected;
+    const auto areSmallEnough = [&](const Candidate& voxels) {
+      return voxels.bytes < smallEnough && !voxels_->areFarBehind();
+    };
     const auto draft = [&](const CancelToken* cancel) {
       seconds_ += secondsOf([&] {
         (void)unlessCancelled([&] {
@@ -194,7 +193,7 @@ class Choice {
     };
     if (!onGpu) {
       expected = estimate();
-      if (!expected || expected->bytes < smallEnough) return expected;
+      if (!expected || areSmallEnough(*expected)) return expected;
       ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
       draft(nullptr);
       return expected;
@@ -203,7 +202,7 @@ class Choice {
     auto trying = std::async(std::launch::async, [&, token = CancelScope::token()] {
       const CancelScope scope(token);
       auto found = estimate();
-      if (found && found->bytes < smallEnough) notNeeded.cancel();
+      if (found && areSmallEnough(*found)) notNeeded.cancel();
       return found;
     });
     draft(&notNeeded);

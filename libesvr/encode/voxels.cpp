@@ -580,6 +580,10 @@ std::optional<Candidate> VoxelSearch::estimate(std::optional<double> rival) {
   return found;
 }
 
+std::uint64_t VoxelSearch::likelyBytes(const Candidate& estimate) const {
+  return isFarBehind_ ? std::uint64_t(double(estimate.bytes) / kThriftyShare) : estimate.bytes;
+}
+
 VoxelCandidate VoxelSearch::candidateOf(Tried tried) const {
   VoxelCandidate made;
   const BestSoFar completion;

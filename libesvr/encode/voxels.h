@@ -43,6 +43,11 @@ class VoxelSearch {
   ///               that they can take, and run() would search on. Nothing: it is not known
   /// \return nothing if no voxels can be that small
   [[nodiscard]] std::optional<Candidate> estimate(std::optional<double> rival = {});
+  /// Whether its result is the least that voxels can take, which is many more bytes than the rival's.
+  [[nodiscard]] bool areFarBehind() const { return isFarBehind_; }
+  /// The bytes to expect of run(), which are more than the least ones.
+  /// \param estimate  what estimate() has returned
+  [[nodiscard]] std::uint64_t likelyBytes(const Candidate& estimate) const;
 
   /// For a size: the coarsest voxels with a PSNR if they are clearly too large, which takes less time to find out than
   /// estimate(); nothing if they may fit.

@@ -90,6 +90,37 @@ TEST(ChoiceForAPsnr, ThatIsCancelledBeforeItBeginsHasNoResult) {
   }
 }
 
+/// A ball with a soft border, which a dozen ellipsoids approximate.
+SparseVolume ballVolume(double border = 0.15) {
+  return test::volumeOf({}, 8, 0.0f, [border](Coord v) {
+    const double r = std::hypot(v.x - 31.5, v.y - 31.5, v.z - 31.5) / 32.0;
+    const double value = 0.5 - 0.5 * std::tanh((r - 0.6) / border);
+    return value > 0.01 ? float(value) : 0.0f;
+  });
+}
+
+/// A whole fit that continues the short one takes a fraction of the time of another one, and need not save as much.
+TEST(ChoiceForAPsnr, SlowTakesAContinuedFitThatSavesLittle) {
+  const SparseVolume volume = ballVolume();
+  ConvertOptions options;
+  options.goal = PsnrGoal{52.0};
+  const Conversion conversion = convertVolume({{}, volume}, options);
+  ASSERT_FALSE(conversion.grid.voxels);
+  EXPECT_GE(psnrOver(volume, conversion), 52.0);
+  EXPECT_LT(double(bytesAdded(conversion.grid)), 0.6 * double(conversion.choice->voxels->bytes));
+}
+
+/// No voxels show that thousands of ellipsoids, with which the search begins, are far too many.
+TEST(ChoiceForAPsnr, SlowOfEllipsoidsAloneTakesAFew) {
+  const SparseVolume volume = ballVolume();
+  ConvertOptions options;
+  options.goal = PsnrGoal{50.0};
+  options.representation = Representation::kEllipsoids;
+  const Conversion conversion = convertVolume({{}, volume}, options);
+  EXPECT_GE(psnrOver(volume, conversion), 50.0);
+  EXPECT_LT(conversion.grid.field.ellipsoidCount(), 200u);
+}
+
 TEST(ChoiceForASize, TakesVoxelsOfNoise) {
   const SparseVolume volume = test::noiseVolume(2);
   const Conversion conversion = choose(volume, SizeGoal{3000});
@@ -145,15 +176,6 @@ TEST(ChoiceForAPreset, SlowHasItsQualityOverTheActiveVoxels) {
   }
 }
 
-/// A ball with a soft border, which a dozen ellipsoids approximate.
-SparseVolume ballVolume() {
-  return test::volumeOf({}, 8, 0.0f, [](Coord v) {
-    const double r = std::hypot(v.x - 31.5, v.y - 31.5, v.z - 31.5) / 32.0;
-    const double value = 0.5 - 0.5 * std::tanh((r - 0.6) / 0.15);
-    return value > 0.01 ? float(value) : 0.0f;
-  });
-}
-
 TEST(ChoiceForAPreset, SlowTakesAFewEllipsoidsThoughTheFirstFitHasManyMore) {
   const SparseVolume volume = ballVolume();
   ConvertOptions options;
@@ -165,6 +187,21 @@ TEST(ChoiceForAPreset, SlowTakesAFewEllipsoidsThoughTheFirstFitHasManyMore) {
   EXPECT_LT(conversion.grid.field.ellipsoidCount(), 100u);
   ASSERT_TRUE(conversion.choice && conversion.choice->voxels);
   EXPECT_LT(bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
+}
+
+/// Voxels of few bytes are taken without a fit, but not where only their least bytes are known to be few.
+TEST(ChoiceForAPreset, SlowTakesEllipsoidsThatAreFarSmallerThanSmallVoxels) {
+  const SparseVolume volume = ballVolume(0.25);
+  ConvertOptions options;
+  options.goal = PresetGoal{};
+  options.fit.preset = Preset::kDraft;
+  GridDescriptor descriptor;
+  descriptor.gridClass = GridClass::kFogVolume;
+  const Conversion conversion = convertVolume({descriptor, volume}, options);
+  ASSERT_FALSE(conversion.grid.voxels);
+  ASSERT_TRUE(conversion.choice->voxels && conversion.choice->voxels->estimated);
+  EXPECT_LT(conversion.choice->voxels->bytes, 1024u);
+  EXPECT_LT(2 * bytesAdded(conversion.grid), conversion.choice->voxels->bytes);
 }
 
 TEST(ChoiceForAPreset, CountsTheActiveVoxelsOfTheBox) {
