@@ -201,7 +201,7 @@ struct Candidate {
   /// PSNR over the box, dB; +inf for exact voxels. Nothing if it was not measured.
   std::optional<double> psnr{};
   /// The figures were extrapolated from a short fit, from a sample, or from the first bricks of
-  /// voxels that are too large.
+  /// voxels that are too large; or the bytes are the least that voxels can take where ellipsoids take far fewer.
   bool estimated = false;
   /// Wall-clock seconds that all trials for this candidate took; nothing if none was made.
   std::optional<double> seconds{};
