@@ -511,14 +511,14 @@ constexpr std::uint64_t kBlockEntryBytes =
     kBoxBytes + kStreams * sizeof(std::uint32_t) + sizeof(std::uint64_t);
 constexpr std::uint64_t kChecksumBytes = sizeof(std::uint64_t);
 
-constexpr std::int64_t kParts = 256;  // divisions of a chunk's box along an axis
+constexpr std::int64_t kPartsOfBox = 256;  // divisions of a chunk's box along an axis
 
 /// Writes a block's box in 256ths of its chunk's box, rounded outwards.
 void putBox(ByteWriter& out, const Box& box, const Box& chunk) {
   for (const auto axis : kAxes) {
     const std::int64_t low = chunk.min.*axis, side = std::int64_t(chunk.max.*axis) - low + 1;
-    out.put(std::uint8_t((box.min.*axis - low) * kParts / side));
-    out.put(std::uint8_t((box.max.*axis - low) * kParts / side));
+    out.put(std::uint8_t((box.min.*axis - low) * kPartsOfBox / side));
+    out.put(std::uint8_t((box.max.*axis - low) * kPartsOfBox / side));
   }
 }
 
@@ -528,8 +528,8 @@ Box getBox(ByteReader& in, const Box& chunk) {
     const std::int64_t low = chunk.min.*axis, side = std::int64_t(chunk.max.*axis) - low + 1;
     const std::int64_t first = in.get<std::uint8_t>(), last = in.get<std::uint8_t>();
     if (first > last) in.fail("the box of a block is empty");
-    box.min.*axis = std::int32_t(low + first * side / kParts);
-    box.max.*axis = std::int32_t(low + ((last + 1) * side + kParts - 1) / kParts - 1);
+    box.min.*axis = std::int32_t(low + first * side / kPartsOfBox);
+    box.max.*axis = std::int32_t(low + ((last + 1) * side + kPartsOfBox - 1) / kPartsOfBox - 1);
   }
   return box;
 }

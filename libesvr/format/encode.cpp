@@ -339,7 +339,7 @@ SectionWriter collect(const EsvrFile& file, const FrameContext& context) {
   std::vector<std::vector<std::byte>> related(
       grids.size());  // each on one thread, which takes long
   parallelFor(std::uint32_t{0}, std::uint32_t(grids.size()), [&](std::uint32_t g) {
-    if (!differences[g] && file.grids[g].reference) related[g] = relatedOf(g, file.grids);
+    if (!context.differences[g] && file.grids[g].reference) related[g] = relatedOf(g, file.grids);
   });
   for (std::uint32_t g = 0; g < grids.size(); ++g) {
     addNonFinite(out, g, file.grids[g], gridBefore(previous, g));

@@ -105,9 +105,9 @@ class SplatDensity {
   }
 
   /// The smallest and the largest value of a channel of the colors.
-  [[nodiscard]] std::pair<float, float> colorRange(std::size_t channel) const {
-    const auto [least, most] = std::ranges::minmax(splats_.color[channel]);
-    return {least, most};
+  [[nodiscard]] ValueRange colorRange(std::size_t channel) const {
+    const auto found = std::ranges::minmax(splats_.color[channel]);
+    return {found.min, found.max};
   }
 
   /// The same with the amplitudes times a channel of the colors.
@@ -208,14 +208,14 @@ VectorGrid colorsOf(const SplatDensity& density, const Field& field, const Volum
                                                              .restrictToBricks = true,
                                                              .masks = grid.volume.active,
                                                              .memory = memory});
-    const auto [least, most] = density.colorRange(channel);
+    const ValueRange range = density.colorRange(channel);
     parallelFor(std::size_t{0}, volume.brickCount(), [&](std::size_t b) {
       const auto sums = volume.brickValues(b);
       const auto weights = grid.volume.brickValues(b);
       // A mean is within its range, whatever the sums are rounded to.
-      forEachActive(volume.active[b], [&, least = least, most = most](int v) {
+      forEachActive(volume.active[b], [&](int v) {
         sums[std::size_t(v)] =
-            std::clamp(sums[std::size_t(v)] / weights[std::size_t(v)], least, most);
+            std::clamp(sums[std::size_t(v)] / weights[std::size_t(v)], range.min, range.max);
       });
     });
   }

@@ -234,7 +234,7 @@ std::size_t nodesOf(const Voxels& voxels, int side) {
     if (corners.empty() || corners.back() != corner) corners.push_back(corner);
   }
   std::ranges::sort(corners);
-  return std::size_t(std::ranges::distance(corners.begin(), std::ranges::unique(corners).begin()));
+  return std::size_t(std::unique(corners.begin(), corners.end()) - corners.begin());
 }
 
 /// Checks the memory of a tree. Its upper nodes have 0.3 MB each of floats, and voxels that are far from each other have
