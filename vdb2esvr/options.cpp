@@ -9,6 +9,7 @@
 
 #include "esvr/error.h"
 #include "programs/resources.h"
+#include "vdb2esvr/convert.h"
 
 namespace esvr::vdb2esvr {
 
