@@ -126,9 +126,10 @@ class VoxelSearch {
   std::uint64_t besides_ = 0;  ///< bytes of a grid without its voxels
   Plateau plateau_;
   bool hasTried_ = false;
-  std::optional<double> rival_;  ///< of estimate()
-  bool isFarBehind_ =
-      false;  ///< the search ended because the voxels take many more bytes than the rival
+  /// Bytes with which ellipsoids may reach the PSNR, as estimate() was told.
+  std::optional<double> rival_;
+  /// The search ended because the voxels take many more bytes than the rival.
+  bool isFarBehind_ = false;
   std::optional<Tried> best_;           ///< the best setting on the sample
   std::optional<std::uint64_t> exact_;  ///< bytes of exact voxels, if they may be the better ones
   double seconds_ = 0.0;

@@ -336,8 +336,8 @@ SectionWriter collect(const EsvrFile& file, const FrameContext& context) {
   if (!inherited.vectors) addVectors(out, file.vectors);
   if (!inherited.carried) addCarriedRecords(out, file.carried, grids.size());
   for (std::uint32_t g = 0; g < grids.size(); ++g) addChunkTable(out, g, grids[g]);
-  std::vector<std::vector<std::byte>> related(
-      grids.size());  // each on one thread, which takes long
+  // Related voxels of a grid are coded by one thread, so that those of several grids are coded at the same time.
+  std::vector<std::vector<std::byte>> related(grids.size());
   parallelFor(std::uint32_t{0}, std::uint32_t(grids.size()), [&](std::uint32_t g) {
     if (!context.differences[g] && file.grids[g].reference) related[g] = relatedOf(g, file.grids);
   });
