@@ -66,11 +66,10 @@ cli::ProgramText programText() {
           "on, each step makes fits 1.6 times as long. On the CPU, fits of large grids are "
           "shorter, and efforts above 5 lengthen these alone; where they would be too short, "
           "voxels are stored, and the summary says so. With --size and --ratio, several grids "
-          "share the bytes in proportion to their active voxels, after each got a few hundred, and "
-          "the bytes of carried grids count. A frame of a sequence without active voxels has no "
-          "size. With --psnr, --count limits the number of ellipsoids. The program makes only a "
-          "short fit if that shows that voxels are better. --representation prescribes one of "
-          "them.\n"
+          "get one quality, the highest one that is found to keep to the size, and the bytes of "
+          "carried grids count. A frame of a sequence without active voxels has no size. With "
+          "--psnr, --count limits the number of ellipsoids. The program makes only a short fit if "
+          "that shows that voxels are better. --representation prescribes one of them.\n"
           "\n"
           "With --count, --seconds or --iterations there is a single fit. Its ellipsoids are "
           "stored unless exact voxels take no more bytes. With --psnr and --seconds, it ends as "
@@ -198,8 +197,7 @@ void addFileOptions(cli::po::options_description& options) {
      "leave this grid out; may be repeated")
     ("share", value<std::string>()->value_name("W")->default_value("auto"),
      "auto: grids of one transform refer to each other where that makes the file smaller, and small "
-     "parts of the file are stored together; off: each grid is stored on its own. With --size "
-     "and --ratio, no grid refers to another one")
+     "parts of the file are stored together; off: each grid is stored on its own")
     ("nonfinite", value<std::string>()->value_name("W")->default_value("refuse"),
      "refuse: fail on NaN or infinite voxels; keep: store where they are, so that they come back; zero, "
      "background or a number: replace them by 0, by the background of the grid or by that number")

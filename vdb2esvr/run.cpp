@@ -215,20 +215,25 @@ class FileConversion {
     fitted_ = choice.fitted;
     measured_.resize(fitted_.size());
     FileSource source = sourceOf(options_, record.input, choice);
-    if (options_.onlyFits)
-      for (GridSource& grid : source.grids)
-        grid.readCarried = nullptr;  // its fits are all that counts
+    if (needsOnlyFits())
+      for (GridSource& grid : source.grids) grid.readCarried = nullptr;
     ConvertedFile made = convertGrids(std::move(source), optionsOfFile(choice, record.input));
     for (const GridConversion& grid : made.grids) record.grids.push_back(recordOf(grid));
     listVectors(made, record);
     listCarried(made, record);
     record.interrupted = made.interrupted;
+    record.quality = made.quality;
     if (record.interrupted && (!options_.keepsBest() || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
     return made;
   }
 
  private:
+  /// True if the fits of this rank are all that counts. For a size, what follows decides which fits come next.
+  [[nodiscard]] bool needsOnlyFits() const {
+    return options_.onlyFits && !options_.size && !options_.ratio;
+  }
+
   /// What an interrupted run leaves.
   [[nodiscard]] std::string whatIsLeft() const {
     if (!options_.resume) return "nothing was written";
@@ -239,7 +244,7 @@ class FileConversion {
   FileOptions optionsOfFile(const GridChoice& choice, const VdbSummary& input) {
     FileOptions options{.convert = options_.convert};
     options.size = sizeOf(options_, choice, input);
-    options.shares = options_.shares && !options_.onlyFits;
+    options.shares = options_.shares && !needsOnlyFits();
     options.severalAtOnce = !parts_.haveRanks();
     options.paper = options_.paper;
     options.previous = options_.previous;

@@ -365,23 +365,6 @@ class SequenceConversion {
 
 // One file for all frames.
 
-bool areAlike(const StoredGrid& a, const StoredGrid& b) {
-  const GridDescriptor &of = a.descriptor, &other = b.descriptor;
-  return of.name == other.name && of.gridClass == other.gridClass &&
-         of.valueType == other.valueType && of.transform == other.transform;
-}
-
-bool areAlikeCarried(const CarriedGrid& a, const CarriedGrid& b) {
-  return a.name == b.name && a.treeType == b.treeType && a.place == b.place;
-}
-
-/// True if two frames have the same grids in the same order, which agree in name, type, class and
-/// transform, so that a frame can refer to the one before it. Voxels and metadata may differ.
-bool haveSameGrids(const EsvrFile& a, const EsvrFile& b) {
-  return std::ranges::equal(a.grids, b.grids, areAlike) &&
-         std::ranges::equal(a.carried, b.carried, areAlikeCarried) && a.vectors == b.vectors;
-}
-
 struct EncodedFrame {
   std::size_t index = 0;  ///< in the record
   InputState input;       ///< as it was before it was read
@@ -418,11 +401,12 @@ class GroupConversion {
     FrameRecord& frame = conversion_.frames()[index];
     Options own = conversion_.optionsOf(frame.frame, worker_);
     own.resume = false;  // the group is converted again as a whole
-    if (previous_) own.previous = {&*previous_, before_};
+    if (previous_) own.previous = {&*previous_, before_, quality_};
     last_.input = stateOf(frame.frame);
     conversion_.convert(own, frame, [&](const EsvrFile& file) { return encode(index, file); });
     keepEncoded();
     before_ = std::exchange(frame.before, {});
+    quality_ = frame.quality;
   }
 
   void hold(std::size_t index) {
@@ -461,6 +445,7 @@ class GroupConversion {
   std::vector<EncodedFrame> encoded_;
   std::optional<EsvrFile> previous_;  ///< the last frame of the group as a reader gets it
   std::vector<GridBefore> before_;    ///< FrameBefore::grids of it
+  double quality_ = 0.0;              ///< FrameBefore::quality of it
   EncodedFrame last_;                 ///< the frame that was encoded last
   EsvrFile decoded_;                  ///< the same as a reader gets it
 };

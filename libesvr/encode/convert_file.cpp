@@ -1,6 +1,6 @@
-// Converts the grids of a file together: vectors get one scale, grids of equal voxels are converted once, a
-// size is divided, small grids are converted at the same time, and vectors that are smaller unchanged are
-// carried. share_grids.cpp then lets voxels refer to those of another grid.
+// Converts the grids of a file together: vectors get one scale, grids of equal voxels are converted once, small grids
+// are converted at the same time, and vectors that are smaller unchanged are carried. share_grids.cpp then lets
+// voxels refer to those of another grid. For a size, this is repeated with other qualities.
 #include "esvr/convert_file.h"
 
 #include <tbb/global_control.h>
@@ -8,9 +8,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <future>
 #include <map>
-#include <numeric>
 #include <string>
 #include <utility>
 #include <variant>
@@ -18,7 +18,7 @@
 #include "core/add_seconds.h"
 #include "core/counted.h"
 #include "encode/grids_of_file.h"
-#include "encode/job.h"
+#include "encode/root_search.h"
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
@@ -75,6 +75,16 @@ InputKey keyOf(const ConvertInput& input) {
 }
 
 // ---- One grid, and several at the same time
+
+namespace {
+
+/// True for a grid whose conversion keeps few threads busy: its voxels are coded in one or two blocks, each on one thread.
+bool isSmall(const GridSource& grid) {
+  constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
+  return grid.activeVoxels <= kMostActive;
+}
+
+}  // namespace
 
 namespace encode {
 
@@ -175,6 +185,7 @@ void allowForNarrowing(const VolumeGrid& source, Goal& goal) {
 }  // namespace
 
 const Goal& GridConverter::goalOf(std::size_t g) const {
+  if (goal_) return *goal_;
   return grids_[g].goal ? *grids_[g].goal : options_.convert.goal;
 }
 
@@ -211,8 +222,8 @@ bool GridConverter::needsExactSet(std::size_t g, const VolumeGrid& source) const
 /// What is known of a grid of the previous frame; null if nothing is.
 const GridBefore* GridConverter::recordOf(const StoredGrid* previous) const {
   if (!previous) return nullptr;
-  const auto& [file, grids] = options_.previous;
-  const auto at = std::size_t(previous - file->grids.data());
+  const std::span<const GridBefore> grids = options_.previous.grids;
+  const auto at = std::size_t(previous - options_.previous.file->grids.data());
   return at < grids.size() ? &grids[at] : nullptr;
 }
 
@@ -224,16 +235,32 @@ bool GridConverter::isAsBefore(const StoredGrid* previous, const VolumeGrid& sou
          previous->descriptor.valueType == source.descriptor.valueType;
 }
 
-GridConversion GridConverter::make(std::size_t g, const Wish& wish, bool isAlone) {
+GridConversion GridConverter::make(std::size_t g, bool isAlone) {
   GridConversion made;
   step(g, isAlone, [&](const FitOptions& fit) {
     double secondsRead = 0.0, secondsConvert = 0.0;
     const VolumeGrid source = addSeconds(secondsRead, [&] { return read(g); });
-    made = addSeconds(secondsConvert, [&] { return convert(g, source, wish, fit); });
+    made = addSeconds(secondsConvert, [&] { return convert(g, source, nullptr, fit); });
     made.secondsRead = secondsRead, made.secondsConvert = secondsConvert;
-    if (options_.onConverted) options_.onConverted(source, made);
+    tell(source, made);
   });
   return made;
+}
+
+void GridConverter::tell(const VolumeGrid& source, const GridConversion& made) const {
+  if (options_.onConverted && !isTrial_) options_.onConverted(source, made);
+}
+
+void GridConverter::tellAll(const std::vector<GridConversion>& grids) {
+  isTrial_ = false;
+  if (!options_.onConverted) return;
+  const Completion completion;
+  const bool areSmall = std::ranges::all_of(
+      grids, [&](const GridConversion& grid) { return isSmall(grids_[grid.source]); });
+  forEachAtOnce(grids.size(), areSmall ? mostAtOnce() : 1, [&](std::size_t i) {
+    if (grids[i].twinOf) return;
+    step(grids[i].source, false, [&](const FitOptions&) { tell(read(grids[i].source), grids[i]); });
+  });
 }
 
 std::size_t GridConverter::mostAtOnce() const {
@@ -244,15 +271,15 @@ std::size_t GridConverter::mostAtOnce() const {
   return options_.severalAtOnce ? std::min(kAtOnce, threads) : 1;
 }
 
-GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
-                                      const FitOptions& fit) const {
+GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source,
+                                      const StoredGrid* expected, const FitOptions& fit) const {
   GridConversion made{.source = g, .convertedAs = g, .key = keyOf(g, source)};
   made.bricks = source.volume.brickCount();
   made.nonFiniteReplaced = source.nonFiniteReplaced;
   made.inactive = source.inactive;
   const StoredGrid* const previous = previousOf(g);
-  const GridBefore* const before = wish.expected ? nullptr : recordOf(previous);
-  if (!wish.expected && isAsBefore(previous, source, made.key)) {
+  const GridBefore* const before = expected ? nullptr : recordOf(previous);
+  if (!expected && isAsBefore(previous, source, made.key)) {
     made.asBefore = true;
     made.conversion.grid = *previous;
     made.conversion.compact = before->compact;
@@ -262,14 +289,13 @@ GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source, c
   }
   ConvertOptions options = options_.convert;
   options.fit = fit;
-  options.goal = wish.bytes ? Goal(SizeGoal{*wish.bytes}) : resolvedGoal(g, source);
-  options.previous = wish.expected ? wish.expected : previous;
+  options.goal = resolvedGoal(g, source);
+  options.previous = expected ? expected : previous;
   if (before) options.previousCompact = before->compact;
-  if (wish.expected) options.keepsPastErrors = false;  // those of another grid are not worth it
+  if (expected) options.keepsPastErrors = false;  // those of another grid are not worth it
   if (scales_[g].peak) options.fit.peak = scales_[g].peak;
   if (grids_[g].component) options.measure = Measure::kValues;
-  // With a size, every grid uses its own bytes for its values.
-  if (!wish.bytes && needsExactSet(g, source)) options.storage.activity = Activity::kExact;
+  if (needsExactSet(g, source)) options.storage.activity = Activity::kExact;
   const ConvertInput input{source.descriptor, source.volume};
   if (!options_.paper) {
     made.conversion = convertVolume(input, options);
@@ -286,13 +312,7 @@ GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source, c
 namespace {
 
 using encode::GridConverter;
-using encode::SizeTooSmall;
-
-/// True for a grid whose conversion keeps few threads busy: its voxels are coded in one or two blocks, each on one thread.
-bool isSmall(const GridSource& grid) {
-  constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
-  return grid.activeVoxels <= kMostActive;
-}
+using encode::RootSearch;
 
 // Grids of equal voxels.
 
@@ -360,309 +380,63 @@ GridConversion twinOf(const GridConversion& grid, std::size_t source, const Twin
   return made;
 }
 
-// The division of a size.
-
-StoredGrid withDescriptor(StoredGrid grid, const GridDescriptor& descriptor) {
-  grid.descriptor = descriptor;
-  return grid;
-}
-
-/// The bytes that a twin usually adds: its record, and rows for the ellipsoids of one chunk, for
-/// the bricks or the mask, and for the errors of layers. Voxels have fewer rows.
-std::uint64_t usualBytes(const GridDescriptor& twin) {
-  constexpr std::uint64_t kRows = 3;
-  StoredGrid grid;
-  grid.field.chunks.resize(1);
-  return bytesAdded(withDescriptor(std::move(grid), twin)) + kRows * kSectionRowBytes;
-}
-
-/// The bytes of what a file holds besides its converted grids.
-/// \throws UsageError  they leave nothing of `size`
-std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size) {
-  std::vector<StoredVector> vectors;
-  for (std::size_t g = 0; g < source.grids.size(); ++g)
-    if (source.grids[g].component == std::size_t{0}) vectors.push_back({source.grids[g].name, g});
-  const std::uint64_t ofCarried = bytesOfCarried(source.carried);
-  const std::uint64_t bytes =
-      bytesBesideGrids(source.metadata) + ofCarried + bytesOfVectors(vectors);
-  if (bytes < size) return bytes;
-  std::string text = "the file takes " + std::to_string(bytes) + " bytes without any fitted grid";
-  if (ofCarried > 0)
-    text += " (grids that are carried unchanged take " + std::to_string(ofCarried) +
-            " of them; to skip some makes room)";
-  throw UsageError(text + "; the size allows " + std::to_string(size));
-}
-
-std::uint64_t less(std::uint64_t bytes, std::uint64_t by) { return bytes - std::min(bytes, by); }
-
-/// The bytes that grids were found to need, by their indices.
-using LeastBytes = std::map<std::size_t, std::uint64_t>;
-
-/// Divides the wanted size of a file among its grids. Every grid gets a few bytes, or those that it was found to
-/// need, and grids share the others by their active voxels. Bytes that a grid does not use go to those that
-/// are converted after it. Twins of a grid have no share; the bytes of their records are reserved.
-///
-/// A grid is converted to bytes that it takes on its own. In a compact file it takes a few hundred fewer, which are
-/// known of the grids that are made, and which the next ones get in addition.
-class ByteShares {
- public:
-  /// \param isCompact  the file will have FileLayout::kCompact
-  ByteShares(const FileSource& source, std::optional<std::uint64_t> size, const Twins& twins,
-             const LeastBytes& needed, bool isCompact)
-      : left_(size), shares_(source.grids.size()), isCompact_(isCompact) {
-    records_.layout = FileLayout::kCompact;
-    // A file without grids has nothing to divide, and no option makes it smaller.
-    if (source.grids.empty() && source.carried.empty()) left_.reset();
-    if (!left_) return;
-    *left_ -= bytesBesideConverted(source, *left_);
-    for (std::size_t g = 0; g < shares_.size(); ++g) {
-      if (const auto twin = twins.find(g); twin != twins.end()) {
-        reserve(twin->second);
-        continue;
-      }
-      weightLeft_ += shares_[g].weight = double(source.grids[g].activeVoxels) + 1.0;
-    }
-    setLeast(needed);
-  }
-
-  /// True if grids need more bytes than there are, and get them.
-  [[nodiscard]] bool isOverdrawn() const { return isOverdrawn_; }
-
-  /// Bytes for a grid without its twins; nothing if no size is wanted.
-  [[nodiscard]] std::optional<std::uint64_t> of(std::size_t grid) const {
-    if (!left_) return std::nullopt;
-    const Share& share = shares_[grid];
-    const double divided = double(less(*left_, leastLeft_));
-    return share.least + std::uint64_t(divided * share.weight / weightLeft_);
-  }
-
-  /// Bytes that a grid saves in a compact file, as far as is known: the fewest of those that were made.
-  [[nodiscard]] std::uint64_t saved() const { return saved_.value_or(0); }
-
-  /// Subtracts the bytes of a converted grid and of its twins.
-  /// \param previous  the same grid of the previous frame, from which it is predicted; null: none
-  /// \return the bytes by which they exceed their share; if there are any, nothing is subtracted
-  [[nodiscard]] std::uint64_t take(std::size_t grid, const StoredGrid& stored,
-                                   const StoredGrid* previous) {
-    if (!left_) return 0;
-    const Share& share = shares_[grid];
-    const std::uint64_t allowed = *of(grid) + share.reserved;
-    const std::uint64_t bytes =
-        isCompact_ ? bytesInCompact(share, stored) : bytesOf(share, stored, previous);
-    if (bytes > allowed) return bytes - allowed;
-    if (isCompact_) {
-      records_.grids.push_back(encode::recordAlone(stored));
-      const std::uint64_t saved = less(bytesAdded(stored), bytes);
-      if (share.twins.empty()) saved_ = std::min(saved_.value_or(saved), saved);
-    }
-    left_ = less(*left_ + share.reserved, bytes);
-    weightLeft_ -= share.weight;
-    leastLeft_ -= share.least;
-    return 0;
-  }
-
- private:
-  /// A grid that is not a twin.
-  struct Share {
-    double weight = 0.0;
-    std::uint64_t least = 0;
-    std::vector<GridDescriptor> twins;
-    std::uint64_t reserved = 0;  ///< expected bytes of the twins
-  };
-
-  void reserve(const Twin& twin) {
-    Share& share = shares_[twin.of];
-    constexpr std::uint64_t kSmallerInCompact = 4;
-    const std::uint64_t bytes = usualBytes(twin.descriptor) / (isCompact_ ? kSmallerInCompact : 1);
-    share.twins.push_back(twin.descriptor);
-    share.reserved += bytes;
-    left_ = less(*left_, bytes);
-  }
-
-  /// Gives grids the bytes that they need, and the others the same few bytes.
-  void setLeast(const LeastBytes& needed) {
-    for (const auto& [g, bytes] : needed) leastLeft_ += shares_[g].least = bytes;
-    // A file of small grids takes fewer bytes than its grids, each for itself, so that it may still fit.
-    isOverdrawn_ = leastLeft_ > *left_;
-    left_ = std::max(*left_, leastLeft_);
-    const auto isOther = [&](std::size_t g) {
-      return shares_[g].weight > 0.0 && !needed.contains(g);
-    };
-    std::uint64_t others = 0;
-    for (std::size_t g = 0; g < shares_.size(); ++g) others += isOther(g);
-    if (others == 0) return;
-    // The record of a grid, its rows in the table, and the codes of a few values. Shares by active
-    // voxels alone would be too small for a grid of a few voxels beside a large one.
-    constexpr std::uint64_t kLeastOfGrid = 512;
-    const std::uint64_t least = std::min(kLeastOfGrid, less(*left_, leastLeft_) / others);
-    for (std::size_t g = 0; g < shares_.size(); ++g)
-      if (isOther(g)) leastLeft_ += shares_[g].least = least;
-  }
-
-  /// Bytes that a grid with its twins adds to a compact file with the records of those that were taken, which take few
-  /// bytes together. It depends on them by their padding only.
-  [[nodiscard]] std::uint64_t bytesInCompact(const Share& share, const StoredGrid& stored) const {
-    constexpr std::uint64_t kPadding = 8;
-    EsvrFile file = records_;
-    file.grids.push_back(stored);
-    for (const auto& descriptor : share.twins)
-      file.grids.push_back(withDescriptor(stored, descriptor));
-    return encodeEsvr(file).size() + kPadding - encodeEsvr(records_).size();
-  }
-
-  [[nodiscard]] static std::uint64_t bytesOf(const Share& share, const StoredGrid& stored,
-                                             const StoredGrid* previous) {
-    const std::uint64_t bytes = bytesInFrame(stored, previous);
-    if (share.twins.empty()) return bytes;
-    std::vector<StoredGrid> all{stored};
-    for (const auto& descriptor : share.twins) all.push_back(withDescriptor(stored, descriptor));
-    return bytes + bytesAddedTogether(std::move(all)) - bytesAdded(stored);
-  }
-
-  std::optional<std::uint64_t> left_;  ///< bytes without those reserved
-  double weightLeft_ = 0.0;
-  std::uint64_t leastLeft_ = 0;  ///< the least bytes of the grids that have none yet
-  bool isOverdrawn_ = false;
-  std::vector<Share> shares_;  ///< one for each grid; that of a twin is not used
-  bool isCompact_;
-  EsvrFile records_;  ///< records of the grids that were taken, if the file is compact
-  std::optional<std::uint64_t> saved_;
-};
-
 // Every grid of a file.
 
-/// Converts the grids until all are done or the call is cancelled: small ones at the same time, and then one
-/// after the other.
+/// Converts the grids that are no twins, until all are done or the call is cancelled: small ones at the same time,
+/// and then one after the other.
 class GridsConversion {
  public:
-  GridsConversion(const FileSource& source, const FileOptions& options, GridConverter& converter)
-      : source_(source), options_(options), converter_(converter), made_(source.grids.size()) {}
+  GridsConversion(const std::vector<GridSource>& grids, const FileOptions& options,
+                  GridConverter& converter, const Twins& twins)
+      : grids_(grids),
+        options_(options),
+        converter_(converter),
+        twins_(twins),
+        made_(grids.size()) {}
 
   /// \return a conversion for each grid, or nothing for those that were not converted
   std::vector<std::optional<GridConversion>> run() {
-    converter_.findScales();
-    twins_ = findTwins(source_.grids, converter_);
-    ByteShares shares(source_, options_.size, twins_, {}, isCompact());
     convertSmall();
-    while (!convertAll(shares)) {
-      earlier_ = std::exchange(made_, std::vector<std::optional<GridConversion>>(made_.size()));
-      shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
-      if (!isCompact() || !shares.isOverdrawn()) continue;
-      // What a grid needs is known of its own bytes, of which a compact file saves an unknown number. A size that this
-      // number decides may still do for grids that are each counted alone.
-      isEachAlone_ = true;
-      shares = ByteShares(source_, options_.size, twins_, needed_, isCompact());
-    }
-    isOverdrawn_ = shares.isOverdrawn();
+    for (std::size_t g = 0; g < made_.size() && !converter_.isCancelled(); ++g)
+      if (!made_[g] && !twins_.contains(g)) convert(g);
     for (const auto& [g, twin] : twins_)
       if (made_[twin.of]) made_[g] = twinOf(*made_[twin.of], g, twin);
     return std::move(made_);
   }
 
-  /// True if grids divide a size of a compact file. In large files they would gain little, and those of a sequence
-  /// refer to the frame before.
-  [[nodiscard]] bool isCompact() const {
-    constexpr std::uint64_t kMostCompact = std::uint64_t{1} << 20;
-    return options_.size && *options_.size <= kMostCompact && options_.shares && !isEachAlone_ &&
-           !options_.previous.file && source_.grids.size() + source_.carried.size() > 1;
-  }
-
-  /// True if grids have more bytes than the size allows, so that the size of the file has to be looked at.
-  [[nodiscard]] bool isOverdrawn() const { return isOverdrawn_; }
-
  private:
-  /// Converts the small grids of a file that do not share bytes, at the same time, since each of them
-  /// keeps few threads and little of a GPU busy.
+  /// Converts the small grids of a file at the same time, since each of them keeps few threads and little of a GPU
+  /// busy.
   void convertSmall() {
     // A single fit takes the time that was asked for, and shows its progress.
     const ConvertOptions& convert = options_.convert;
     if (convert.fit.seconds || std::holds_alternative<FitGoal>(convert.goal)) return;
-    if (options_.size || !options_.severalAtOnce || source_.grids.size() < 2) return;
+    if (!options_.severalAtOnce || grids_.size() < 2) return;
     std::vector<std::size_t> small;
     for (std::size_t g = 0; g < made_.size(); ++g)
-      if (!twins_.contains(g) && isSmall(source_.grids[g])) small.push_back(g);
+      if (!twins_.contains(g) && isSmall(grids_[g])) small.push_back(g);
     // The largest come first, so that none of them is left alone at the end.
     std::ranges::stable_sort(small, std::ranges::greater(),
-                             [&](std::size_t g) { return source_.grids[g].activeVoxels; });
+                             [&](std::size_t g) { return grids_[g].activeVoxels; });
     encode::forEachAtOnce(small.size(), converter_.mostAtOnce(), [&](std::size_t i) {
       try {
-        made_[small[i]] = converter_.make(small[i], {}, false);
+        made_[small[i]] = converter_.make(small[i], false);
       } catch (const DeviceError&) {  // it is converted again where another device can take over
       } catch (const Cancelled&) {
       }
     });
   }
 
-  /// The order in which grids are converted. Those that share a size begin with the one that takes the fewest
-  /// bytes for its voxels in the source, since it probably leaves most of its share to the others.
-  [[nodiscard]] std::vector<std::size_t> order() const {
-    std::vector<std::size_t> order(source_.grids.size());
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    const auto bytesEach = [&](std::size_t g) {
-      const GridSource& grid = source_.grids[g];
-      return double(grid.storedBytes) / double(grid.activeVoxels + 1);
-    };
-    if (options_.size) std::ranges::stable_sort(order, {}, bytesEach);
-    return order;
-  }
-
-  /// Converts the grids that are not made yet, twins aside.
-  /// \return false if one needs more bytes than its share, so that the size must be divided again
-  bool convertAll(ByteShares& shares) {
-    for (const std::size_t g : order()) {
-      if (made_[g] || twins_.contains(g) || converter_.isCancelled()) continue;
-      const std::uint64_t share = shares.of(g).value_or(0);
-      try {
-        convert(g, shares);
-      } catch (const SizeTooSmall& error) {
-        if (source_.grids.size() == 1) throw;
-        // With other bytes another fit may need a few more. These steps end such a search soon.
-        needed_[g] = share + std::max(error.missing, share / 8 + 8);
-        return false;
-      }
-    }
-    return true;
-  }
-
-  /// Takes what was made by an earlier division of the size, where its bytes suit this one too.
-  bool takeEarlier(std::size_t g, ByteShares& shares) {
-    if (earlier_.empty() || !earlier_[g]) return false;
-    if (shares.take(g, earlier_[g]->conversion.grid, converter_.previousOf(g)) > 0) return false;
-    made_[g] = std::move(earlier_[g]);
-    return true;
-  }
-
-  /// Converts a grid to the bytes of its share. Each of its twins repeats a row of the table for
-  /// every section. How many there are is known after a conversion only; where they exceed what is
-  /// reserved for the twins, the grid is converted again to fewer bytes.
-  void convert(std::size_t g, ByteShares& shares) try {
-    if (takeEarlier(g, shares)) return;
-    std::optional<std::uint64_t> bytes = shares.of(g);
-    if (bytes) *bytes += shares.saved();
-    GridConversion grid = converter_.make(g, {.bytes = bytes}, true);
-    const auto excessOf = [&]() -> std::uint64_t {
-      const BestSoFar completion;
-      // No grid follows an interrupted one.
-      return converter_.isCancelled()
-                 ? 0
-                 : shares.take(g, grid.conversion.grid, converter_.previousOf(g));
-    };
-    while (const std::uint64_t excess = excessOf()) {
-      bytes = less(*bytes, excess);
-      grid = converter_.make(g, {.bytes = bytes}, true);
-    }
-    made_[g] = std::move(grid);
+  void convert(std::size_t g) try {
+    made_[g] = converter_.make(g, true);
   } catch (const Cancelled&) {  // before it had a result
   }
 
-  const FileSource& source_;
+  const std::vector<GridSource>& grids_;
   const FileOptions& options_;
   GridConverter& converter_;
-  Twins twins_;
-  LeastBytes needed_;
-  bool isOverdrawn_ = false, isEachAlone_ = false;
+  const Twins& twins_;
   std::vector<std::optional<GridConversion>> made_;
-  std::vector<std::optional<GridConversion>> earlier_;  ///< by another division of the size
 };
 
 // Vectors, and the file.
@@ -705,11 +479,11 @@ std::uint64_t bytesOfVector(const std::vector<GridConversion>& grids, const Stor
 }
 
 /// Carries the vectors that take fewer bytes unchanged than as converted components, unless an option
-/// prescribes the representation or a size.
+/// prescribes the representation.
 void carrySmallerVectors(const FileOptions& options, const GridConverter& converter,
                          FileSource& source, ConvertedFile& made) {
   if (options.convert.representation != Representation::kAuto ||
-      options.convert.storage.form != Storage::kCompact || options.size)
+      options.convert.storage.form != Storage::kCompact)
     return;
   const std::vector<StoredVector> vectors = vectorsOf(source.grids, made.grids);
   const auto gridOf = [&](const StoredVector& vector) -> const GridSource& {
@@ -764,12 +538,141 @@ void assemble(FileSource& source, ConvertedFile& made) {
   if (!file.carried.empty()) file.layout = FileLayout::kCompact;  // each has two small sections
 }
 
-void requireSize(const EsvrFile& file, std::uint64_t size) {
-  const std::size_t bytes = encodeEsvr(file).size();
-  if (bytes > size)
-    throw UsageError("the smallest file that was found takes " + std::to_string(bytes) +
-                     " bytes; the size allows " + std::to_string(size) +
-                     ", and to skip some grids makes room");
+/// Converts all grids with the goals that the converter has.
+ConvertedFile convertOnce(FileSource source, const FileOptions& options, GridConverter& converter,
+                          const Twins& twins) {
+  ConvertedFile made;
+  made.grids =
+      completeOnes(source.grids, GridsConversion(source.grids, options, converter, twins).run());
+  made.interrupted = converter.isCancelled();
+  {
+    const Completion completion;
+    if (!made.interrupted) carrySmallerVectors(options, converter, source, made);
+    forgetMissingTwins(made.grids);
+    assemble(source, made);
+  }
+  encode::shareGrids(options, converter, made);
+  made.interrupted = converter.isCancelled();
+  return made;
+}
+
+// A size.
+
+/// The bytes of what a file holds besides its converted grids.
+/// \throws UsageError  they leave nothing of `size`
+std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size) {
+  std::vector<StoredVector> vectors;
+  for (std::size_t g = 0; g < source.grids.size(); ++g)
+    if (source.grids[g].component == std::size_t{0}) vectors.push_back({source.grids[g].name, g});
+  const std::uint64_t ofCarried = bytesOfCarried(source.carried);
+  const std::uint64_t bytes =
+      bytesBesideGrids(source.metadata) + ofCarried + bytesOfVectors(vectors);
+  if (bytes < size) return bytes;
+  std::string text = "the file takes " + std::to_string(bytes) + " bytes without any fitted grid";
+  if (ofCarried > 0)
+    text += " (grids that are carried unchanged take " + std::to_string(ofCarried) +
+            " of them; to skip some makes room)";
+  throw UsageError(text + "; the size allows " + std::to_string(size));
+}
+
+/// Finds the quality that all grids of a file can have within its size. Grids that are equally good are
+/// what a viewer of all of them wants, and with a quality, they refer to each other and to the frame before.
+class SizeSearch {
+ public:
+  SizeSearch(const FileSource& source, const FileOptions& options, GridConverter& converter,
+             const Twins& twins)
+      : source_(source),
+        options_(options),
+        converter_(converter),
+        twins_(twins),
+        seconds_(source.grids.size()) {}
+
+  ConvertedFile run() {
+    const double size = double(*options_.size), first = options_.previous.quality;
+    RootSearch search({kLeast, kMost, kNarrowest, kLongest}, std::log2(kAimedShare * size),
+                      kOctavesPerDb, first);
+    double before = 0.0;
+    for (int trial = 0; !search.ended() && (trial < kMostTrials || !best_); ++trial) {
+      const double bytes = double(tryQuality(search.next()));
+      if (converter_.isCancelled()) break;
+      const double enough = trial == 0 && options_.previous.file ? kEnoughOfFrame : kEnough;
+      if (enough * size <= bytes && bytes <= size) break;
+      // No voxel changes any more.
+      if (std::exchange(before, bytes) == bytes && bytes <= size) break;
+      // Far from the size, exact voxels may keep to it, too.
+      if (trial == 0 && mayBeExact() && kFar * bytes < size && double(tryQuality(kExact)) <= size)
+        break;
+      search.learn(std::log2(bytes));
+    }
+    const bool isCancelled = converter_.isCancelled();
+    if (!best_ && isCancelled) best_.emplace();
+    if (!best_)
+      throw UsageError("the smallest file that was found takes " + std::to_string(*fewest_) +
+                       " bytes; the size allows " + std::to_string(*options_.size) +
+                       ", and to skip some grids makes room");
+    best_->interrupted = isCancelled;
+    for (GridConversion& grid : best_->grids) grid.secondsConvert = seconds_[grid.source];
+    converter_.tellAll(best_->grids);
+    return std::move(*best_);
+  }
+
+ private:
+  /// dB above the quality of the preset: from nearly nothing to single bits of floats, and what only exact voxels have.
+  static constexpr double kLeast = -36.0, kMost = 90.0, kExact = 150.0;
+  static constexpr double kNarrowest = 0.05;  ///< dB that are hardly seen
+  /// Fits of much more than the size would take long.
+  static constexpr double kLongest = 10.0;
+  /// Bytes of gas_0004 double with 11 to 16 dB, those of fluid_data_0041 with 11 and those of smooth fits with 3 to 6.
+  static constexpr double kOctavesPerDb = 0.1;
+  /// Shares of the size that are aimed at, and that are enough. Frames vary by more than the search is worth.
+  static constexpr double kAimedShare = 0.985, kEnough = 0.96, kEnoughOfFrame = 0.88;
+  static constexpr double kFar = 4.0;  ///< of the size, relative to the bytes of the preset
+  static constexpr int kMostTrials = 6;
+
+  [[nodiscard]] bool mayBeExact() const {
+    return options_.convert.representation != Representation::kEllipsoids;
+  }
+
+  /// Converts the file with a quality, and keeps it if it is the best one that keeps to the size.
+  /// \return its bytes
+  std::uint64_t tryQuality(double more) {
+    converter_.tryGoal(PresetGoal{more});
+    ConvertedFile made = convertOnce(source_, options_, converter_, twins_);
+    const std::uint64_t bytes = bytesOf(made.file);
+    fewest_ = std::min(fewest_.value_or(bytes), bytes);
+    for (const GridConversion& grid : made.grids) seconds_[grid.source] += grid.secondsConvert;
+    const bool isWorse = best_ && (made.interrupted || best_->quality >= more);
+    if (bytes > *options_.size || isWorse) return bytes;
+    made.quality = more;
+    best_ = std::move(made);
+    return bytes;
+  }
+
+  [[nodiscard]] std::uint64_t bytesOf(const EsvrFile& file) const {
+    const Completion completion;
+    const EsvrFile* const before = options_.previous.file;
+    return encodeFrame(file, before && haveSameGrids(file, *before) ? before : nullptr).size();
+  }
+
+  const FileSource& source_;
+  const FileOptions& options_;
+  GridConverter& converter_;
+  const Twins& twins_;
+  std::optional<ConvertedFile> best_;
+  std::optional<std::uint64_t> fewest_;
+  std::vector<double> seconds_;  ///< that all conversions of each grid took
+};
+
+/// Converts the grids to a file of at most a size.
+ConvertedFile convertToSize(const FileSource& source, const FileOptions& options,
+                            GridConverter& converter, const Twins& twins) {
+  const std::uint64_t beside = bytesBesideConverted(source, *options.size);
+  if (source.grids.size() > 1 || options.previous.file)
+    return SizeSearch(source, options, converter, twins).run();
+  converter.setGoal(SizeGoal{*options.size - beside});
+  ConvertedFile made = convertOnce(source, options, converter, twins);
+  if (!made.grids.empty()) made.quality = made.grids.front().conversion.more;
+  return made;
 }
 
 }  // namespace
@@ -781,23 +684,11 @@ std::string GridSource::storedName() const {
 ConvertedFile convertGrids(FileSource source, const FileOptions& options) {
   const CancelScope scope(CancelScope::orToken(options.convert.fit.cancel));
   GridConverter converter(source.grids, options);
-  ConvertedFile made;
-  GridsConversion conversion(source, options, converter);
-  made.grids = completeOnes(source.grids, conversion.run());
-  made.interrupted = converter.isCancelled();
-  {
-    const Completion completion;
-    if (!made.interrupted) carrySmallerVectors(options, converter, source, made);
-    forgetMissingTwins(made.grids);
-    assemble(source, made);
-  }
-  encode::shareGrids(options, converter, made);
-  made.interrupted = converter.isCancelled();
-  if (conversion.isOverdrawn() || conversion.isCompact()) {
-    made.file.layout = FileLayout::kCompact;
-    requireSize(made.file, *options.size);
-  }
-  return made;
+  converter.findScales();
+  const Twins twins = findTwins(source.grids, converter);
+  const bool isEmpty = source.grids.empty() && source.carried.empty();
+  if (options.size && !isEmpty) return convertToSize(source, options, converter, twins);
+  return convertOnce(source, options, converter, twins);
 }
 
 }  // namespace esvr

@@ -150,12 +150,11 @@ class Choice {
 
   bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
 
-  SizeTooSmall tooSmall(std::uint64_t needed) const {
+  UsageError tooSmall(std::uint64_t needed) const {
     const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
                                          : "has no voxels of that size";
-    return {"grid '" + shownName(job_.input.descriptor.name) + "' " + takes + "; the size allows " +
-                std::to_string(*goal_.bytes),
-            needed > *goal_.bytes ? needed - *goal_.bytes : 0};
+    return UsageError("grid '" + shownName(job_.input.descriptor.name) + "' " + takes +
+                      "; the size allows " + std::to_string(*goal_.bytes));
   }
 
   Conversion ellipsoidsAlone() {
@@ -317,13 +316,31 @@ bool isQuality(const Goal& goal) {
          std::holds_alternative<PictureGoal>(goal);
 }
 
+/// The quality of a PresetGoal, and that of the preset for other goals.
+PresetQuality presetQuality(const ConvertOptions& options) {
+  PresetQuality quality = qualityOf(options.fit.preset);
+  if (const auto* goal = std::get_if<PresetGoal>(&options.goal)) {
+    quality.psnr += goal->more, quality.picturePsnr += goal->more;
+    quality.surfaceBound *= std::pow(10.0, -goal->more / 20.0);
+  }
+  return quality;
+}
+
 /// The quality of a goal that is one, dB, as the job measures it.
 double wantedQuality(const Job& job) {
   if (const auto* psnr = std::get_if<PsnrGoal>(&job.options.goal)) return psnr->psnr;
   if (const auto* pictures = std::get_if<PictureGoal>(&job.options.goal)) return pictures->psnr;
-  const PresetQuality preset = qualityOf(job.options.fit.preset);
+  const PresetQuality preset = presetQuality(job.options);
   return seesPictures(job) ? preset.picturePsnr
                            : preset.psnr + boxGain(job.input.source, job.options);
+}
+
+/// By how many dB the quality of a conversion is above that of the preset; 0 if it is not known.
+double moreThanPreset(const Job& job, const Conversion& made) {
+  if (!made.choice) return 0.0;
+  const auto& stored = made.grid.voxels ? made.choice->voxels : made.choice->ellipsoids;
+  const bool isKnown = stored && stored->psnr && std::isfinite(*stored->psnr);
+  return isKnown ? *stored->psnr - wantedQuality(job) : 0.0;
 }
 
 /// \throws UsageError  the quality of a goal is none
@@ -688,7 +705,7 @@ std::optional<Conversion> convertSurface(const ConvertInput& input, ConvertOptio
   if (!change || isUsualBand(input, options, *change)) return std::nullopt;
   std::optional<double> bound;
   if (std::holds_alternative<PresetGoal>(options.goal)) {
-    bound = qualityOf(options.fit.preset).surfaceBound * *change;
+    bound = presetQuality(options).surfaceBound * *change;
     options.goal = BoundGoal{*bound};
   }
   options.representation = Representation::kVoxels;
@@ -739,6 +756,7 @@ std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput
                                  : layerErrorsOf(made->grid, given.source, judge->comparison());
   }
   made->byPictures = seesPictures(job);
+  if (std::holds_alternative<SizeGoal>(options.goal)) made->more = moreThanPreset(job, *made);
   made->grid = throughTheFormat(std::move(made->grid), previous, memoryOf(given.source));
   requirePromises(job, made->grid);
   return made;

@@ -12,14 +12,6 @@
 
 namespace esvr::encode {
 
-/// What one conversion of a grid is to give.
-struct Wish {
-  std::optional<std::uint64_t> bytes{};  ///< bytes that it may add to the file
-  /// A grid that is like this one and that its voxels are to refer to; null: the same grid of the previous
-  /// frame, if there is one.
-  const StoredGrid* expected = nullptr;
-};
-
 /// Reads and converts single grids of a file.
 class GridConverter {
  public:
@@ -37,15 +29,24 @@ class GridConverter {
   [[nodiscard]] VolumeGrid read(std::size_t g) const { return grids_[g].read(); }
   [[nodiscard]] SourceKey keyOf(std::size_t g, const VolumeGrid& source) const;
   [[nodiscard]] const Goal& goalOf(std::size_t g) const;
+  /// Replaces the goals of all grids.
+  void setGoal(const Goal& goal) { goal_ = goal; }
+  /// The same for a trial, of which FileOptions::onConverted is not told.
+  void tryGoal(const Goal& goal) { goal_ = goal, isTrial_ = true; }
+  /// Tells FileOptions::onConverted of a conversion, unless it is a trial.
+  void tell(const VolumeGrid& source, const GridConversion& made) const;
+  /// Reads the grids of a trial that is the result, and tells of all of them.
+  void tellAll(const std::vector<GridConversion>& grids);
   /// The same grid of the previous frame, which is the one with its number among those that are stored by its
   /// name; null if there is none.
   [[nodiscard]] const StoredGrid* previousOf(std::size_t g) const;
 
   /// Reads a grid and converts it in a step. \throws Cancelled  the conversion has no result
-  [[nodiscard]] GridConversion make(std::size_t g, const Wish& wish, bool isAlone);
-  /// Converts a grid within a step.
-  [[nodiscard]] GridConversion convert(std::size_t g, const VolumeGrid& source, const Wish& wish,
-                                       const FitOptions& fit) const;
+  [[nodiscard]] GridConversion make(std::size_t g, bool isAlone);
+  /// Converts a grid within a step. \param expected  a grid that is like this one and that its voxels are to
+  /// refer to; null: the same grid of the previous frame, if there is one
+  [[nodiscard]] GridConversion convert(std::size_t g, const VolumeGrid& source,
+                                       const StoredGrid* expected, const FitOptions& fit) const;
   /// Number of small grids that are worked on at the same time.
   [[nodiscard]] std::size_t mostAtOnce() const;
 
@@ -71,7 +72,9 @@ class GridConverter {
 
   const std::vector<GridSource>& grids_;
   const FileOptions& options_;
-  FitOptions fit_;  ///< options of the fits; their device may change
+  FitOptions fit_;            ///< options of the fits; their device may change
+  std::optional<Goal> goal_;  ///< instead of those of all grids
+  bool isTrial_ = false;
   std::vector<VectorScale> scales_;
   std::vector<ActiveSet> sets_;  ///< the active voxels of the vectors of the file
 };

@@ -38,12 +38,6 @@ struct Job {
 };
 inline constexpr int kAveraged = 2;
 
-/// A size that no form of a grid keeps to.
-struct SizeTooSmall : UsageError {
-  SizeTooSmall(const std::string& what, std::uint64_t by) : UsageError(what), missing(by) {}
-  std::uint64_t missing;  ///< bytes by which the size is too small; 0: unknown
-};
-
 /// True if the conversion was cancelled. What it has so far is then completed in the shortest way.
 [[nodiscard]] bool isCancelled(const Job& job);
 

@@ -189,10 +189,9 @@ void takeBytes(const StoredGrid& kept, const ConvertOptions& options, SizeGoal& 
   const bool isSame = before && before->nonFiniteVoxels == kept.nonFiniteVoxels;
   const std::uint64_t bytes = kCounts + (isSame ? kSameAsBefore : format::bytesOfNonFinite(kept));
   if (bytes >= goal.bytes)
-    throw SizeTooSmall("the places of the voxels of grid '" + shownName(kept.descriptor.name) +
-                           "' that are not finite take " + std::to_string(bytes) +
-                           " bytes; the size allows " + std::to_string(goal.bytes),
-                       bytes - goal.bytes + 1);
+    throw UsageError("the places of the voxels of grid '" + shownName(kept.descriptor.name) +
+                     "' that are not finite take " + std::to_string(bytes) +
+                     " bytes; the size allows " + std::to_string(goal.bytes));
   goal.bytes -= bytes;
 }
 

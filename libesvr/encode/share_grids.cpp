@@ -324,8 +324,8 @@ class Sharing {
     const StoredGrid expected = encode::expectedFrom(file_.grids, g, reference);
     converter_.step(grids_[g].source, false, [&](const FitOptions& fit) {
       const VolumeGrid source = converter_.read(grids_[g].source);
-      StoredGrid again = converter_.convert(grids_[g].source, source, {.expected = &expected}, fit)
-                             .conversion.grid;
+      StoredGrid again =
+          converter_.convert(grids_[g].source, source, &expected, fit).conversion.grid;
       if (!again.voxels) return;
       const StoredGrid before = std::exchange(file_.grids[g], std::move(again));
       const std::uint64_t bytes = bytesWith(g, reference);
@@ -335,7 +335,7 @@ class Sharing {
       }
       shared.bytesWith = bytes;
       grids_[g].conversion.grid = file_.grids[g];
-      if (options_.onConverted) options_.onConverted(source, grids_[g]);
+      converter_.tell(source, grids_[g]);
     });
   }
 
@@ -372,8 +372,7 @@ StoredGrid encode::recordAlone(const StoredGrid& grid) {
 }
 
 void encode::shareGrids(const FileOptions& options, GridConverter& converter, ConvertedFile& made) {
-  // The bytes of a wanted size are divided among grids that are stored on their own.
-  if (!options.shares || options.size || made.grids.size() < 2) return;
+  if (!options.shares || made.grids.size() < 2) return;
   Sharing(options, converter, made).run();
   made.file.layout = FileLayout::kCompact;
   made.isShared = true;

@@ -261,6 +261,19 @@ using namespace format;
 
 // ---- Frames
 
+bool haveSameGrids(const EsvrFile& a, const EsvrFile& b) {
+  const auto areAlike = [](const StoredGrid& grid, const StoredGrid& other) {
+    const GridDescriptor &x = grid.descriptor, &y = other.descriptor;
+    return x.name == y.name && x.gridClass == y.gridClass && x.valueType == y.valueType &&
+           x.transform == y.transform;
+  };
+  const auto areAlikeCarried = [](const CarriedGrid& x, const CarriedGrid& y) {
+    return x.name == y.name && x.treeType == y.treeType && x.place == y.place;
+  };
+  return std::ranges::equal(a.grids, b.grids, areAlike) &&
+         std::ranges::equal(a.carried, b.carried, areAlikeCarried) && a.vectors == b.vectors;
+}
+
 std::vector<std::byte> encodeFrame(const EsvrFile& frame, const EsvrFile* previous) {
   if (previous)
     if (auto differences = differencesOf(frame, *previous))

@@ -53,6 +53,20 @@ TEST(RootSearch, TakesAnInfiniteFigure) {
   EXPECT_NEAR(found(50.0, 12.0, 40, exact), 4.0, 2.0 * kNarrowest);
 }
 
+TEST(RootSearch, FollowsTheSlopeThatTwoTrialsShow) {
+  const auto flat = [](double x) { return 2.0 * x; };  // a third of the usual slope
+  EXPECT_NEAR(found(30.0, 1.0, 5, flat), 15.0, 0.5);
+}
+
+TEST(RootSearch, TakesNoStepThatIsTooLong) {
+  RootSearch search({.low = 0.0, .high = 100.0, .narrowest = kNarrowest, .longest = 10.0}, 90.0,
+                    1.0, 0.0);
+  for (const double x : {0.0, 10.0, 20.0}) {
+    EXPECT_NEAR(search.next(), x, 1e-9);
+    search.learn(0.1 * x);
+  }
+}
+
 TEST(RootSearch, EndsWhereNothingReachesTheAim) {
   EXPECT_TRUE(std::isnan(found(50.0, 12.0, 200, [](double) { return 0.0; })));
 }

@@ -1,7 +1,7 @@
 #pragma once
 /// Converts the grids of a file together, as vdb2esvr does: grids of equal voxels once, vectors as three
-/// components of one scale, a size divided among all grids, and voxels that refer to those of a grid that is
-/// like them.
+/// components of one scale, all grids with the best quality for a size of the file, and voxels that refer to
+/// those of a grid that is like them.
 ///
 ///     writeEsvr("smoke.esvr", convertGrids(readSources("smoke.vdb")).file);
 
@@ -131,14 +131,16 @@ struct GridBefore {
 struct FrameBefore {
   const EsvrFile* file = nullptr;       ///< null: there is none
   std::span<const GridBefore> grids{};  ///< those of the file, in their order
+  double quality = 0.0;                 ///< ConvertedFile::quality
 };
 
 struct FileOptions {
   /// The options and the goal of all grids; by default those of vdb2esvr. A size of a single grid is no goal
   /// for a file.
   ConvertOptions convert{.goal = PresetGoal{}};
-  /// Largest size of the file, bytes, which replaces all goals. It is divided by the numbers of active
-  /// voxels, and bytes that a grid does not use go to the grids after it. A file without grids has none.
+  /// Largest size of the file, bytes, which replaces all goals. A file of one grid has a SizeGoal. The grids of
+  /// other files, and of frames with a frame before them, have the highest PresetGoal::more with which the file is
+  /// not larger, of some conversions that come near to the size. A file without grids has no size.
   std::optional<std::uint64_t> size{};
   bool shares =
       true;  ///< voxels may refer to those of another grid, and small sections share a row
@@ -166,11 +168,13 @@ struct ConvertedFile {
   /// The conversion was cancelled; grids and vectors that were not complete are left out.
   bool interrupted = false;
   bool isShared = false;  ///< the grids were compared with each other
+  double quality = 0.0;   ///< PresetGoal::more of grids that keep to a size, about
 };
 
 /// Converts the grids of a file. The result is as deterministic as convertVolume(). A cancelled call
 /// (FitOptions::cancel, or the token of the thread) returns the grids that are complete.
-/// \throws UsageError  the size leaves nothing for the grids; as for convertVolume
+/// \throws UsageError  no file of the size was found; as for convertVolume
+/// \throws Cancelled  before a file of the size was found
 /// \throws  what the sources throw, and as for convertVolume
 [[nodiscard]] ConvertedFile convertGrids(FileSource source, const FileOptions& options = {});
 

@@ -37,6 +37,8 @@ struct FitGoal {
 /// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
 /// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {
+  double more =
+      0.0;  ///< dB above the quality of the preset; halves the bound of a surface every 6.02 dB
   friend auto operator<=>(const PresetGoal&, const PresetGoal&) = default;
 };
 
@@ -221,6 +223,8 @@ struct Conversion {
   /// True if the goal was measured by what is seen (Measure::kAuto, PictureGoal). The figures of candidates
   /// in dB then are those of this measure.
   bool byPictures = false;
+  /// With a SizeGoal, about the PresetGoal::more of the same quality; 0 if it is not known.
+  double more = 0.0;
   /// The bound on the errors of a level set that was judged by its surface, value units.
   std::optional<double> surfaceBound{};
   /// True if ellipsoids were not tried because fitting them would take longer than the effort allows.

@@ -92,6 +92,10 @@ struct DecodeOptions {
 // Encodes the frames of a sequence. The voxels of a frame may refer to those of the frame before
 // it, which usually takes fewer bytes. docs/format.md, "Frames", specifies every byte.
 
+/// True if two frames have the same grids in the same order, which agree in name, type, class and transform, so that
+/// one can refer to the other. Voxels and metadata may differ.
+[[nodiscard]] bool haveSameGrids(const EsvrFile& a, const EsvrFile& b);
+
 /// Encodes a file as a frame. Each grid that holds voxels, and whose predecessor has the same number
 /// in `previous` and holds voxels too, is stored as its difference from its predecessor if that
 /// takes fewer bytes. All other grids are stored as encodeEsvr() stores them. The bytes are those of
