@@ -6,6 +6,7 @@
 
 #include "cli/conversion.h"
 #include "esvr/workers.h"
+#include "fit/volumes.h"
 
 namespace esvr::test {
 namespace {
@@ -138,9 +139,7 @@ VolumeGrid denseGrid() {
   grid.descriptor.name = "density";
   grid.descriptor.transform = uniformTransform(1.0);
   SparseVolume& volume = grid.volume;
-  for (std::int32_t x = 0; x < kSide; ++x)
-    for (std::int32_t y = 0; y < kSide; ++y)
-      for (std::int32_t z = 0; z < kSide; ++z) volume.bricks.push_back({x, y, z});
+  volume.bricks = cubeOfBricks(kSide);
   volume.active.resize(volume.brickCount());
   for (auto& mask : volume.active) mask.setAll();
   volume.values.resize(volume.brickCount() * kBrickVoxels);

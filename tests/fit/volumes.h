@@ -2,9 +2,12 @@
 /// Volumes of bricks, and small ones that suit fits, for several folders of tests.
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <numeric>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -47,17 +50,26 @@ inline std::vector<BrickInput> bricksOf(const SparseVolume& volume) {
   return bricks;
 }
 
-/// Bricks at these corners, in which every voxel is active and has the value of a function of its place.
-template <class Value>
-SparseVolume fullBricks(const std::vector<Coord>& corners, float background, const Value& value) {
+/// Bricks at these corners. Functions of the place of a voxel tell its value and whether it is active.
+template <class Value, class IsActive>
+SparseVolume bricksAt(const std::vector<Coord>& corners, float background, const Value& value,
+                      const IsActive& isActive) {
   std::vector<BrickInput> bricks;
   for (const Coord corner : corners) {
     BrickInput& brick = bricks.emplace_back(BrickInput{corner, {}, {}});
-    for (int v = 0; v < kBrickVoxels; ++v)
-      brick.values[std::size_t(v)] = float(value(corner + voxelLocal(v)));
-    brick.active.setAll();
+    for (int v = 0; v < kBrickVoxels; ++v) {
+      const Coord at = corner + voxelLocal(v);
+      brick.values[std::size_t(v)] = float(value(at));
+      if (isActive(at)) brick.active.set(v);
+    }
   }
   return makeVolume(std::move(bricks), background);
+}
+
+/// The same with all voxels active.
+template <class Value>
+SparseVolume fullBricks(const std::vector<Coord>& corners, float background, const Value& value) {
+  return bricksAt(corners, background, value, [](Coord) { return true; });
 }
 
 /// Bricks at these corners, full of random values from 0 to 1.
@@ -76,6 +88,20 @@ inline SparseVolume volumeOf(Coord corner, int bricks, float background,
     for (int v = 0; v < kBrickVoxels; ++v)
       if (brick.values[std::size_t(v)] == background) brick.active.reset(v);
   return makeVolume(std::move(input), background);
+}
+
+/// What two volumes differ in first, values bit by bit; or "".
+inline std::string volumeDifference(const SparseVolume& a, const SparseVolume& b) {
+  const auto bitsDiffer = [](float x, float y) {
+    return std::bit_cast<std::uint32_t>(x) != std::bit_cast<std::uint32_t>(y);
+  };
+  if (a.origin != b.origin) return "the origin";
+  if (bitsDiffer(a.background, b.background)) return "the background";
+  if (a.bricks != b.bricks) return "the bricks";
+  if (a.active != b.active) return "the active voxels";
+  const int values = std::inner_product(a.values.begin(), a.values.end(), b.values.begin(), 0,
+                                        std::plus<>(), bitsDiffer);
+  return values == 0 ? "" : std::to_string(values) + " values";
 }
 
 // ---- Volumes for fits
@@ -104,15 +130,12 @@ inline SparseVolume tubeVolume(Coord shift = {}) {
 /// The narrow band of a ball as a level set. The background is 3, the inside -3, and bricks without
 /// a voxel of the band are left out.
 inline SparseVolume levelSetVolume() {
-  const SparseVolume volume = volumeOf({}, 6, 3.0f, [](Coord v) {
-    const double distance = std::hypot(v.x - 23.5, v.y - 23.5, v.z - 23.5) - 19.0;
-    return float(std::clamp(distance, -3.0, 3.0));
-  });
-  auto bricks = bricksOf(volume);
-  for (BrickInput& brick : bricks)
-    for (int v = 0; v < kBrickVoxels; ++v)
-      if (std::abs(brick.values[std::size_t(v)]) == 3.0f) brick.active.reset(v);
-  return makeVolume(std::move(bricks), 3.0f);
+  const auto distance = [](Coord v) {
+    const double d = std::hypot(v.x - 23.5, v.y - 23.5, v.z - 23.5) - 19.0;
+    return float(std::clamp(d, -3.0, 3.0));
+  };
+  return bricksAt(cornersOfCube(6), 3.0f, distance,
+                  [&](Coord v) { return std::abs(distance(v)) < 3.0f; });
 }
 
 inline bool sameBits(const Field& a, const Field& b) {

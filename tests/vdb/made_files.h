@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "esvr/vdb_io.h"
+#include "fit/volumes.h"
 #include "metrics/volumes.h"
 #include "support/files.h"
 #include "support/machine.h"
@@ -43,8 +44,7 @@ openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string
 VolumeGrid gridOf(const std::string& name, const std::vector<Voxel>& voxels,
                   float background = 0.0f);
 
-// Fail unless the bits are the same.
-void expectSameBits(const SparseVolume& actual, const SparseVolume& expected);
+/// Fails unless the descriptors and the bits of the voxels are the same.
 void expectSame(const VolumeGrid& actual, const VolumeGrid& expected);
 
 /// Reads all grids of a file; they must be sound and finite.

@@ -575,10 +575,7 @@ TEST(PaperFitOptionsOfAFit, AreRefusedWhereTheyMakeNoSense) {
 }
 
 TEST(FitByPaper, OfAVolumeThatIsAllBackgroundIsEmpty) {
-  BrickInput brick;
-  brick.values.fill(0.5f);
-  brick.active.setAll();
-  const SparseVolume volume = makeVolume({brick}, 0.5f);
+  const SparseVolume volume = test::fullBricks({Coord{}}, 0.5f, [](Coord) { return 0.5f; });
   EXPECT_EQ(fitByPaper(volume, {}).fit.field.ellipsoidCount(), 0u);
 }
 
