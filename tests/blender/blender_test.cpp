@@ -21,6 +21,7 @@
 
 #include "cli/conversion.h"
 #include "cli/run_program.h"
+#include "support/machine.h"
 #include "vdb/foreign_grids.h"
 
 namespace esvr {
@@ -161,15 +162,13 @@ TEST_F(BlenderImport, SlowShowsVectorsAsOneGridForMotionBlur) {
 }
 
 TEST_F(BlenderImport, SlowRealFileOfHoudiniIsShownAlike) {
-  if (std::string(ESVR_DATA_DIR).empty())
-    GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
+  ESVR_NEEDS_DATA();
   std::filesystem::copy(std::string(ESVR_DATA_DIR) + "/smoke1.vdb", at("in.vdb"));
   EXPECT_THAT(namesOf(importBoth(kBoundedError)), ElementsAre("density"));
 }
 
 TEST_F(BlenderImport, SlowRealFileOfBlenderIsShownAlike) {
-  if (std::string(ESVR_DATA_DIR).empty())
-    GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
+  ESVR_NEEDS_DATA();
   std::filesystem::copy(std::string(ESVR_DATA_DIR) + "/sequence/gas_0006.vdb", at("in.vdb"));
   const json shown = importBoth(kBoundedError);
   EXPECT_EQ(shown["grids"].size(), 24u);  // numbers, vectors, integers and empty grids
@@ -265,8 +264,7 @@ TEST_F(BlenderPicture, SlowOfVectorsIsTheSame) {
 }
 
 TEST_F(BlenderPicture, SlowOfRealFileIsTheSame) {
-  if (std::string(ESVR_DATA_DIR).empty())
-    GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
+  ESVR_NEEDS_DATA();
   // The values reach 5.7, but smoke of a hundredth is visible. A bound keeps it.
   expectSamePicture(std::string(ESVR_DATA_DIR) + "/smoke1.vdb", "density",
                     {"--max-error", "0.01", "--representation", "voxels"});

@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <filesystem>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -34,31 +34,26 @@ inline ProgramRun compare(const std::string& command, const Words& arguments) {
   return runProgram(ESVR_COMPARE, joined({command}, arguments));
 }
 
-/// A folder with a grid, `ref.vdb`, and a fit of it, `fit.esvr`.
+/// A folder with a grid, `in.vdb`, and a fit of it, `in.esvr`.
 class FittedBall : public FolderTest {
  protected:
   void SetUp() override {
-    writeInput(at("ref.vdb"), {{.voxels = softBall({})}});
-    succeeded(quickFit(at("ref.vdb"), at("fit.esvr")));
+    writeInput(at("in.vdb"), {{.voxels = softBall({})}});
+    succeeded(quickFit(at("in.vdb"), at("in.esvr")));
   }
 };
 
-/// The fields of each line. Quoted fields have neither quotes nor line feeds in these tests.
-inline std::vector<Words> csvFields(const std::string& csv) {
-  std::vector<Words> lines;
-  std::istringstream stream(csv);
-  for (std::string line; std::getline(stream, line);) {
-    auto& fields = lines.emplace_back(1);
-    bool quoted = false;
-    for (const char c : line) {
-      if (c == '"') quoted = !quoted;
-      if (c == ',' && !quoted)
-        fields.emplace_back();
-      else if (c != '"')
-        fields.back() += c;
-    }
-  }
-  return lines;
+/// Expects that three threads take frames one by one in the memory that one frame needs, to within a factor of two.
+/// \param run  runs a program with these options
+template <class Run>
+void expectOneByOneWhereMemoryIsShort(const Run& run) {
+  const auto codeWithin = [&](std::uint64_t bytes, const char* threads) {
+    return run({"--max-memory", std::to_string(bytes), "--threads", threads, "--force"}).exitCode;
+  };
+  std::uint64_t enough = 1024;
+  while (codeWithin(enough, "1") == 5) enough *= 2;
+  EXPECT_EQ(codeWithin(enough, "3"), 0) << "a third of it is too little for a frame";
+  EXPECT_EQ(codeWithin(enough / 2, "3"), 5);
 }
 
 /// A folder for a source `in.vdb`, its conversion `out.esvr`, and what comes back of it, `back.vdb`.
@@ -94,11 +89,5 @@ class Vdb2Esvr : public Conversion {
  protected:
   void SetUp() override { writeInput(in(), {{.voxels = softBall({})}}); }
 };
-
-/// Runs a command line in a shell that limits files to 512 bytes, which has the effect of a full
-/// disk. A message on stderr still fits.
-inline ProgramRun runOnFullDisk(const std::string& commandLine) {
-  return runShell("ulimit -f 1; exec " + commandLine);
-}
 
 }  // namespace esvr::test

@@ -11,6 +11,7 @@
 #include <limits>
 
 #include "cli/conversion.h"
+#include "fit/volumes.h"
 #include "vdb/open_vdb.h"
 
 namespace esvr::test {
@@ -245,10 +246,8 @@ TEST_F(VectorConversion, IsLosslessForEachComponent) {
   thereAndBack("--lossless --representation voxels");
   ASSERT_EQ(readEsvr(out()).vectors.size(), 1u);
   const VectorGrid a = readVector(in(), "velocity"), b = readVector(back(), "velocity");
-  for (std::size_t c = 0; c < kComponents; ++c) {
-    EXPECT_EQ(a.components[c].values, b.components[c].values);
-    EXPECT_EQ(a.components[c].active, b.components[c].active);
-  }
+  for (std::size_t c = 0; c < kComponents; ++c)
+    EXPECT_EQ(volumeDifference(a.components[c], b.components[c]), "");
 }
 
 TEST_F(VectorConversion, ReachesAPsnrWithThePeakOfTheLongestVector) {
@@ -364,18 +363,12 @@ TEST_F(SharingGrids, takeFewerBytesWithTheSameQuality) {
   EXPECT_EQ(inspectEsvr(out()).versionMinor, 4);
   EXPECT_EQ(readEsvr(out()).grids[1].reference->grid, std::size_t{0});
   for (const Json& grid : report["grids"]) EXPECT_GE(grid["metrics"]["psnr_active"], kStandardPsnr);
-}
 
-TEST_F(SharingGrids, areNamedByTheReportAndTheSummary) {
-  reportOf("--share off");
-  const std::uint64_t apart = sizeOf("out.esvr");
-  const Json report = reportOf(), heat = report["grids"][1];
+  const Json heat = report["grids"][1];
   EXPECT_EQ(report["asked"]["share"], "auto");
   EXPECT_EQ(heat["shared"]["with"], "density");
   EXPECT_LT(heat["shared"]["bytes_with"], heat["shared"]["bytes_without"]);
-  // The padding of the last section is counted.
   EXPECT_GE(report["output"]["bytes_separate"], apart);
-  EXPECT_LT(report["output"]["bytes_separate"], apart + 8);
   EXPECT_THAT(run_.out, Says("heat: refers to density", "bytes smaller"));
 }
 
@@ -489,8 +482,7 @@ TEST_F(Twins, comeBackWithTheirOwnDescriptors) {
   for (const char* name : {"red", "heat", "green"}) {
     const VolumeGrid source = readGrid(in(), name), found = readGrid(back, name);
     EXPECT_EQ(found.descriptor, source.descriptor) << name;
-    EXPECT_EQ(found.volume.values, source.volume.values) << name;
-    EXPECT_EQ(found.volume.active, source.volume.active) << name;
+    EXPECT_EQ(volumeDifference(found.volume, source.volume), "") << name;
   }
 }
 
@@ -519,26 +511,7 @@ TEST_F(Twins, areListedWithoutCountingTheirBytesTwice) {
 TEST_F(Twins, ofATwinAreNamedAfterTheFirst) {
   const InputGrid ball{.voxels = softBall({})};
   const Json grids = reportOf({ball, ball, ball}, kQuick)["grids"];
-  EXPECT_EQ(grids[1]["same_as"], "density[0]");
-  EXPECT_EQ(grids[2]["same_as"], "density[0]");
-}
-
-TEST_F(Twins, RealFileHasThreeColoursInTheBytesOfOne) {
-  if (std::string(ESVR_DATA_DIR).empty())
-    GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
-  const std::string gas = std::string(ESVR_DATA_DIR) + "/sequence/gas_0001.vdb";
-  const auto bytesOf = [&](const Words& names) {
-    Words arguments{gas, out(), "--lossless", "--force"};
-    for (const auto& name : names) arguments.insert(arguments.end(), {"-g", name});
-    succeeded(vdb2esvr(arguments));
-    return sizeOf("out.esvr");
-  };
-  const std::uint64_t one = bytesOf({"color_r"});
-  EXPECT_LT(bytesOf({"color_r", "color_g", "color_b"}), one + 2 * kBytesOfATwin);
-  const EsvrFile file = readEsvr(out());
-  ASSERT_EQ(file.grids.size(), 3u);
-  EXPECT_EQ(file.grids[2].descriptor.name, "color_b");
-  EXPECT_EQ(decodeGrid(file.grids[2]).values, readGrid(gas, "color_b").volume.values);
+  for (const std::size_t twin : {1, 2}) EXPECT_EQ(grids[twin]["same_as"], "density[0]");
 }
 
 }  // namespace

@@ -247,29 +247,6 @@ TEST_F(OneFile, isConvertedAgainFromTheFirstInputOnThatHasChanged) {
   resumed("in.1.vdb is not as it was");
 }
 
-TEST_F(OneFile, isContinuedFromAnyByteOfItsPartialFile) {
-  writeFrames(1, kGroup + 2);
-  succeeded(convert({}, "whole.esvr"));
-  const std::string whole = bytesOf("whole.esvr");
-  const SequenceReader reader(at("whole.esvr"));
-  const std::uint64_t second = reader.frames()[kGroup].offset;
-  // The header of a file that is not complete says that the file has no bytes and no sections, and what was asked for.
-  fs::rename(at("in.18.vdb"), at("in.eighteen"));
-  writeText(at("in.18.vdb"), "no volume");
-  EXPECT_THAT(convert("--on-error stop --threads 1"), Fails(3));
-  const std::string header = bytesOf("out.esvr.partial").substr(0, 48);
-  fs::rename(at("in.eighteen"), at("in.18.vdb"));
-  for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{30}, second - 1, second + 9}) {
-    writeText(at("out.esvr.partial"), "");
-    std::string left = whole.substr(0, bytes);
-    if (left.size() >= header.size()) left.replace(0, header.size(), header);
-    writeText(at("out.esvr.partial"), left);
-    succeeded(convert("--resume"));
-    EXPECT_TRUE(bytesOf("out.esvr") == whole) << bytes;
-    fs::remove(at("out.esvr"));
-  }
-}
-
 /// A sequence of a whole group and of a frame that takes seconds.
 class SlowLastFrame : public OneFile {
  protected:
@@ -430,11 +407,6 @@ class SequenceBack : public FolderTest {
                                 const std::string& output = "out.%02d.vdb") const {
     return esvr2vdb(joined({at("in.@.esvr"), at(output)}, more));
   }
-  [[nodiscard]] Words outputs() const {
-    Words names = folder_.names();
-    std::erase_if(names, [](const std::string& name) { return name.starts_with("in."); });
-    return names;
-  }
   [[nodiscard]] SparseVolume voxelsOf(const std::string& name) const {
     return readGrid(at(name), "density").volume;
   }
@@ -473,13 +445,7 @@ TEST_F(SequenceBack, namesDamagedFramesAndStopsWhereAsked) {
 }
 
 TEST_F(SequenceBack, isDecodedOneByOneWhereMemoryIsShort) {
-  const auto within = [&](std::uint64_t bytes, const char* threads) {
-    return back({"--max-memory", std::to_string(bytes), "--threads", threads, "--force"}).exitCode;
-  };
-  std::uint64_t enough = 1024;
-  while (within(enough, "1") == 5) enough *= 2;
-  EXPECT_EQ(within(enough, "3"), 0) << "a third of it is too little for a frame";
-  EXPECT_EQ(within(enough / 2, "3"), 5);
+  expectOneByOneWhereMemoryIsShort([&](const Words& options) { return back(options); });
 }
 
 TEST_F(SequenceBack, refusesWhatASequenceCannotHave) {

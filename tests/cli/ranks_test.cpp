@@ -82,21 +82,14 @@ TEST_F(RanksTest, KeepTheExitCodeOfAMissedTarget) {
   EXPECT_TRUE(std::filesystem::exists(at("out.esvr")));
 }
 
-/// How often a text is there.
-std::size_t countOf(const std::string& text, const std::string& all) {
-  std::size_t count = 0;
-  for (std::size_t at = all.find(text); at != all.npos; at = all.find(text, at + 1)) ++count;
-  return count;
-}
-
 TEST_F(RanksTest, SayOnceWhatIsWrongForAll) {
   const auto wrong = onRanks("3", conversion("out.esvr", "--no-such-option"));
   EXPECT_EQ(wrong.exitCode, 2);
-  EXPECT_EQ(countOf("no-such-option", wrong.err), 1u) << wrong.err;
-  EXPECT_EQ(countOf("--help", wrong.err), 1u) << wrong.err;
+  EXPECT_EQ(timesIn(wrong.err, "no-such-option"), 1u) << wrong.err;
+  EXPECT_EQ(timesIn(wrong.err, "--help"), 1u) << wrong.err;
   const auto missing = onRanks("3", {VDB2ESVR, at("none.vdb"), at("out.esvr")});
   EXPECT_EQ(missing.exitCode, 3);
-  EXPECT_EQ(countOf("none.vdb", missing.err), 1u) << missing.err;
+  EXPECT_EQ(timesIn(missing.err, "none.vdb"), 1u) << missing.err;
   const auto help = succeeded(onRanks("2", {VDB2ESVR, "--help"}));
   EXPECT_EQ(help.out, runProgram(VDB2ESVR, "--help").out);
 }
@@ -105,10 +98,10 @@ TEST_F(RanksTest, WarnsWhereARankUsesFewOfItsCores) {
   if (std::thread::hardware_concurrency() < 2) GTEST_SKIP() << "one core is all that there is";
   auto bound = conversion("out.esvr", {});
   const auto onOne = onRanks("1", joined("--bind-to hwthread", bound));
-  EXPECT_EQ(countOf("--bind-to none", onOne.err), 1u) << onOne.err;
+  EXPECT_EQ(timesIn(onOne.err, "--bind-to none"), 1u) << onOne.err;
   auto command = conversion("out.esvr", "--force");
   const auto free = succeeded(onRanks("1", joined("--bind-to none", command)));
-  EXPECT_EQ(countOf("--bind-to none", free.err), 0u) << free.err;
+  EXPECT_EQ(timesIn(free.err, "--bind-to none"), 0u) << free.err;
 }
 
 TEST_F(RanksTest, SaysWhichRankFailsAlone) {
@@ -131,7 +124,7 @@ TEST_F(RanksTest, SlowWriteTheBestResultWhenInterrupted) {
   program.send(SIGINT);
   const auto run = program.wait();
   EXPECT_NE(run.exitCode, 0);
-  EXPECT_EQ(countOf("interrupted;", run.err), 1u) << run.err;
+  EXPECT_EQ(timesIn(run.err, "interrupted;"), 1u) << run.err;
   EXPECT_TRUE(std::filesystem::exists(at("out.esvr"))) << run.err;
 }
 

@@ -49,6 +49,13 @@ inline std::ostream& operator<<(std::ostream& out, const ProgramRun& run) {
 ProgramRun succeeded(ProgramRun run, const char* file = __builtin_FILE(),
                      int line = __builtin_LINE());
 
+/// How often a text has these words.
+[[nodiscard]] inline std::size_t timesIn(const std::string& text, const std::string& words) {
+  std::size_t count = 0;
+  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++count;
+  return count;
+}
+
 /// A run that ended with this code and an error output that has these parts.
 template <class... Parts>
 auto Fails(int code, const Parts&... parts) {

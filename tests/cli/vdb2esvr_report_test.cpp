@@ -207,7 +207,7 @@ void expectTable(const Json& object, const Table& table, const Keys& others,
       expectNamed(object[key], meaning, where + "." + key);
 }
 
-class ReportDoc : public FolderTest {
+class ReportDoc : public FittedBall {
  protected:
   /// Runs a program and merges its report into `all_`.
   void add(const char* program, const Words& arguments, int exitCode = 0) {
@@ -276,7 +276,6 @@ TEST_F(ReportDoc, namesTheKeysOfTheProgressOfASequence) {
 }
 
 TEST_F(ReportDoc, namesTheKeysOfAFailure) {
-  writeInput(at("in.vdb"), {{.voxels = softBall({})}});
   add(VDB2ESVR, {at("in.vdb"), at("out.esvr"), "--size", "99"}, 2);
   const std::string text = paragraphFrom(document_, "A run that writes no file");
   Keys keys = keysOf(all_);
@@ -286,8 +285,6 @@ TEST_F(ReportDoc, namesTheKeysOfAFailure) {
 }
 
 TEST_F(ReportDoc, namesTheKeysOfAPicture) {
-  writeInput(at("in.vdb"), {{.voxels = softBall({})}});
-  succeeded(quickFit(at("in.vdb"), at("in.esvr")));
   add(ESVR_RENDER, {at("in.esvr"), at("p.png"), "--ref", at("in.vdb"), "--resolution", "16x16"});
   add(ESVR_RENDER, {at("in.esvr"), "--bench", "--turntable", "2", "--ref", at("in.vdb"),
                     "--resolution", "16x16", "--device", "cpu"});
@@ -297,15 +294,7 @@ TEST_F(ReportDoc, namesTheKeysOfAPicture) {
   for (const auto& object : timed) expectTable(all_[object], figures, {}, object);
 }
 
-class ComparisonDoc : public ReportDoc {
- protected:
-  void SetUp() override {
-    writeInput(at("in.vdb"), {{.voxels = softBall({})}});
-    succeeded(quickFit(at("in.vdb"), at("in.esvr")));
-  }
-};
-
-TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
+TEST_F(ReportDoc, namesTheKeysOfACheck) {
   // NanoVDB has no place for some metadata, which gives differences.
   succeeded(esvr2vdb({at("in.esvr"), at("back.nvdb")}));
   add(ESVR_COMPARE, {"check", at("in.vdb"), at("back.nvdb"), "--ssim"});
@@ -318,7 +307,7 @@ TEST_F(ComparisonDoc, namesTheKeysOfACheck) {
   expectTable(all_, tableAfter(document_, "The report of `check`"), {}, "check");
 }
 
-TEST_F(ComparisonDoc, namesTheKeysOfATable) {
+TEST_F(ReportDoc, namesTheKeysOfATable) {
   add(ESVR_COMPARE, {"table", at("in.vdb"), at("in.esvr"), "--runs", "1", "--images", "1",
                      "--image-size", "16", "--device", "cpu"});
   expectTable(all_, tableAfter(document_, "The report of `table`"), {"rows"}, "table");

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
 
 #include "cli/conversion.h"
 #include "esvr/encode.h"
@@ -58,21 +57,6 @@ TEST_F(SequenceFiles, haveTheBytesOfSingleFilesOnAnyNumberOfThreads) {
       EXPECT_EQ(readText(at(some)), one);
     }
   }
-}
-
-TEST_F(SequenceFiles, haveAnyPatternAndAnyDigits) {
-  writeInput(at("in.0000.vdb"), {{.voxels = softBall({})}});
-  writeInput(at("in.-005.vdb"), {{.voxels = softBall({})}});
-  writeInput(at("in.12345.vdb"), {{.voxels = softBall({})}});
-  writeInput(at("in.7.vdb"), {{.voxels = softBall({})}});
-  const auto to = [&](const char* input, const char* output, const Words& more = {}) {
-    succeeded(vdb2esvr(joined({at(input), at(output)}, more)));
-  };
-  to("in.%04d.vdb", "out.@@@@@@@@@@@@.esvr", {"--frames", "-5-0x5"});
-  to("in.$F4.vdb", "out.@.esvr");
-  to("in.@.vdb", "out##.esvr", {"--frames", "7"});
-  EXPECT_THAT(outputs(), ElementsAre("out.-00000000005.esvr", "out.-5.esvr", "out.0.esvr",
-                                     "out.000000000000.esvr", "out.12345.esvr", "out07.esvr"));
 }
 
 TEST_F(SequenceFiles, haveOneQualityWithoutAGoal) {
@@ -141,15 +125,12 @@ TEST_F(SequenceFiles, thatHoldADamagedOneFailToo) {
 
 TEST_F(SequenceFiles, areOneFileIfThePatternIsInTheNameOfAFolder) {
   writeFrames(2);
-  for (const char* folder : {"out@farm", "out #2", "out100%d", "out$F", "out.####"}) {
-    const std::string file = std::string(folder) + "/all.esvr";
-    EXPECT_THAT(convert({}, file), Fails(1)) << "there is no folder " << folder;
-    EXPECT_THAT(outputs(), IsEmpty());
-    std::filesystem::create_directories(at(folder));
-    succeeded(convert({}, file));
-    EXPECT_TRUE(std::filesystem::exists(at(file)));
-    std::filesystem::remove_all(at(folder));
-  }
+  const std::string file = "out.####/all.esvr";
+  EXPECT_THAT(convert({}, file), Fails(1)) << "there is no folder out.####";
+  EXPECT_THAT(outputs(), IsEmpty());
+  fs::create_directories(at("out.####"));
+  succeeded(convert({}, file));
+  EXPECT_TRUE(isThere(file));
 }
 
 TEST_F(SequenceFiles, withoutActiveVoxelsHaveNoSizeToKeepTo) {
@@ -270,14 +251,7 @@ TEST_F(SequenceFiles, thatMissTheirPsnrAreNamed) {
 
 TEST_F(SequenceFiles, areConvertedOneByOneWhereMemoryIsShort) {
   writeFrames(3);
-  const auto within = [&](std::uint64_t bytes, const char* threads) {
-    return convertQuickly({"--max-memory", std::to_string(bytes), "--threads", threads, "--force"})
-        .exitCode;
-  };
-  std::uint64_t enough = 1024;
-  while (within(enough, "1") == 5) enough *= 2;
-  EXPECT_EQ(within(enough, "3"), 0) << "a third of it is too little for a frame";
-  EXPECT_EQ(within(enough / 2, "3"), 5);
+  expectOneByOneWhereMemoryIsShort([&](const Words& options) { return convertQuickly(options); });
 }
 
 TEST_F(SequenceFiles, thatHaveTheNameOfAPatternAreFiles) {
@@ -310,12 +284,6 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"DIR/in.@.vdb DIR/out.@.esvr", 3, "has another number of digits"},
         Refusal{"DIR/no.####.vdb DIR/out.####.esvr", 3, "no file matches"},
         Refusal{"DIR/in.####.vdb DIR/out.####.esvr --resume -f", 2, "choose one"}));
-
-std::size_t timesIn(const std::string& text, const std::string& words) {
-  std::size_t count = 0;
-  for (auto at = text.find(words); at != std::string::npos; at = text.find(words, at + 1)) ++count;
-  return count;
-}
 
 /// Three frames with the grids bool, int32, vec3s, points and density.
 class CarriedSequence : public FolderTest {
@@ -402,17 +370,6 @@ TEST_F(CarriedSequence, WarnsOnceOfGridsThatTheOutputCannotHold) {
                    "frames 1-3: a NanoVDB file holds no metadata", Not(HasSubstr("back.1.nvdb"))));
   EXPECT_THAT(convertBack("no.@.nvdb", "-g vec3s"),
               Fails(2, "no.1.nvdb: grid \"vec3s\" cannot be written"));
-}
-
-TEST_F(CarriedSequence, OfLargeCarriedGridsIsConvertedOneByOneWhereMemoryIsShort) {
-  const auto within = [&](std::uint64_t bytes, const char* threads) {
-    return convert({"--max-memory", std::to_string(bytes), "--threads", threads, "--keep",
-                    "density", "--force"})
-        .exitCode;
-  };
-  std::uint64_t enough = 1024;
-  while (within(enough, "1") == 5) enough *= 2;
-  EXPECT_EQ(within(enough, "3"), 0) << "a third of it is too little for a frame";
 }
 
 }  // namespace

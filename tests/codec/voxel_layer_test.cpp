@@ -123,20 +123,10 @@ TEST(QuantisedLayer, HasNoValueBeyondFloat) {
   EXPECT_EQ(volumeOf(layer).values.back(), std::numeric_limits<float>::max());
 }
 
-bool sameBits(std::span<const float> a, std::span<const float> b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](float x, float y) {
-    return std::bit_cast<std::uint32_t>(x) == std::bit_cast<std::uint32_t>(y);
-  });
-}
-
 void expectExact(const SparseVolume& volume, VoxelForm form) {
   const VoxelLayer layer = exactLayer(volume);
   EXPECT_EQ(layer.form, form);
-  const SparseVolume back = volumeOf(layer);
-  EXPECT_TRUE(sameBits(back.values, volume.values));
-  EXPECT_EQ(back.active, volume.active);
-  EXPECT_EQ(back.bricks, volume.bricks);
-  EXPECT_EQ(back.origin, volume.origin);
+  EXPECT_EQ(test::volumeDifference(volumeOf(layer), volume), "");
   EXPECT_EQ(largestError(volume, layer), 0.0);
 }
 

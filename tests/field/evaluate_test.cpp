@@ -19,7 +19,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <array>
@@ -34,22 +33,16 @@
 #include "field/line_form.h"
 #include "field/random_field.h"
 #include "field/voxel_rule.h"
+#include "fit/volumes.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {
 
 // Voxels.
 
+using test::cornersOfCube;
 using test::RandomFieldOptions;
-
-/// Corners of a cube of bricks^3 bricks, beginning at `corner`.
-std::vector<Coord> cube(Coord corner, int bricks) {
-  std::vector<Coord> corners;
-  for (int x = 0; x < bricks; ++x)
-    for (int y = 0; y < bricks; ++y)
-      for (int z = 0; z < bricks; ++z) corners.push_back(corner + Coord{x, y, z} * kBrickSide);
-  return corners;
-}
 
 std::vector<float> evaluate(const Field& field, const std::vector<Coord>& corners) {
   std::vector<float> values(corners.size() * kBrickVoxels);
@@ -75,7 +68,7 @@ class EvaluateKappa : public testing::TestWithParam<float> {};
 TEST_P(EvaluateKappa, AgreesWithTheFloat64Sum) {
   const Field field = test::randomField({.count = 30, .extent = 32, .kappa = GetParam()});
   const double steepness = std::max(1.0, double(GetParam()));
-  EXPECT_LT(largestError(field, cube({-8, -8, -8}, 6)),
+  EXPECT_LT(largestError(field, cornersOfCube(6, {-8, -8, -8})),
             4e-7 * steepness * test::intensitySum(field));
 }
 INSTANTIATE_TEST_SUITE_P(Kernels, EvaluateKappa,
@@ -87,7 +80,7 @@ TEST_P(EvaluateAspect, StaysAccurateForNeedlesAndPancakes) {
   const auto [aspect, tolerance] = GetParam();
   const Field field = test::randomField(
       {.count = 30, .extent = 24, .smallest = 0.3, .aspect = aspect, .intensity = 1.0, .seed = 11});
-  EXPECT_LT(largestError(field, cube({0, 0, 0}, 3)), tolerance);
+  EXPECT_LT(largestError(field, cornersOfCube(3)), tolerance);
 }
 INSTANTIATE_TEST_SUITE_P(Aspects, EvaluateAspect,
                          testing::Values(std::pair{10.0, 1e-5}, std::pair{100.0, 3e-5},
@@ -103,22 +96,20 @@ TEST(Evaluate, IsTheSameBitsAtTenMillionVoxels) {
   const RandomFieldOptions near{.count = 20, .extent = 16};
   RandomFieldOptions far = near;
   far.origin = {10'000'000, -10'000'000, 10'000'000};
-  const auto there = cube(far.origin, 2);
-  EXPECT_EQ(evaluate(test::randomField(near), cube({}, 2)),
+  const auto there = cornersOfCube(2, far.origin);
+  EXPECT_EQ(evaluate(test::randomField(near), cornersOfCube(2)),
             evaluate(test::randomField(far), there));
 }
 
 TEST(Evaluate, DoesNotDependOnTheNumberOfThreads) {
   const Field field = test::randomField({.count = 300, .extent = 64});
-  const auto corners = cube({}, 8);
-  const auto all = evaluate(field, corners);
-  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  EXPECT_EQ(evaluate(field, corners), all);
+  const auto corners = cornersOfCube(8);
+  test::expectSameOnAnyThreads([&] { return evaluate(field, corners); });
 }
 
 TEST(Evaluate, DoesNotDependOnTheOtherBricks) {
   const Field field = test::randomField({.count = 50, .extent = 24});
-  const auto many = evaluate(field, cube({}, 3));
+  const auto many = evaluate(field, cornersOfCube(3));
   const auto one = evaluate(field, {{0, 0, 0}});
   EXPECT_TRUE(std::equal(one.begin(), one.end(), many.begin()));
 }
@@ -127,14 +118,15 @@ TEST(Evaluate, UsesEachEllipsoidsOwnKappaWhereGiven) {
   Field field = test::randomField({.count = 20, .extent = 16});
   auto& e = field.chunks[0].ellipsoids;
   for (std::size_t i = 0; i < e.size(); ++i) e.kappa.push_back(float(i) - 8.0f);
-  EXPECT_LT(largestError(field, cube({}, 2)), 5e-6 * test::intensitySum(field));
+  EXPECT_LT(largestError(field, cornersOfCube(2)), 5e-6 * test::intensitySum(field));
 }
 
 TEST(Evaluate, AddsChunksOfDifferentOrigins) {
   Field field = test::randomField({.count = 10, .extent = 16});
   field.chunks.push_back(
       test::randomField({.count = 10, .extent = 16, .origin = {-5, 3, 9}, .seed = 3}).chunks[0]);
-  EXPECT_LT(largestError(field, cube({-16, -16, -16}, 5)), 1e-6 * test::intensitySum(field));
+  EXPECT_LT(largestError(field, cornersOfCube(5, {-16, -16, -16})),
+            1e-6 * test::intensitySum(field));
 }
 
 TEST(ReachedBricks, HoldEveryVoxelThatIsNotBackground) {
@@ -143,7 +135,7 @@ TEST(ReachedBricks, HoldEveryVoxelThatIsNotBackground) {
   const auto reached = reachedBricks(field);
   EXPECT_TRUE(std::is_sorted(reached.begin(), reached.end()));
   const std::set<Coord> set(reached.begin(), reached.end());
-  for (const Coord corner : cube({-80, -80, -80}, 25)) {
+  for (const Coord corner : cornersOfCube(25, {-80, -80, -80})) {
     if (set.contains(corner)) continue;
     for (int v = 0; v < kBrickVoxels; v += 7)
       ASSERT_EQ(evaluateReference(field, corner + voxelLocal(v)), 0.0) << toString(corner);
@@ -187,7 +179,7 @@ bool liesOnAnEnd(const Field& field, Coord voxel) {
 /// error may be the jump, 0.006.
 TEST(PaperKernel, AgreesWithTheFloat64SumOnBothSidesOfItsJump) {
   const Field field = paperField(5, 16);
-  const auto corners = cube({-8, -8, -8}, 4);
+  const auto corners = cornersOfCube(4, {-8, -8, -8});
   const auto values = evaluate(field, corners);
   std::size_t onAnEnd = 0;
   for (std::size_t v = 0; v < values.size(); ++v) {

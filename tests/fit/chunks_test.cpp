@@ -12,7 +12,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -405,9 +404,8 @@ TEST(FitInChunks, GivesTheSameBitsOnAnyNumberOfThreads) {
   const SparseVolume volume = longTube();
   FitOptions options = shortFit(kChunkVoxels);
   options.iterations = 20;
-  const FitResult usual = fit(volume, options);
-  const tbb::global_control single(tbb::global_control::max_allowed_parallelism, 1);
-  EXPECT_TRUE(test::sameBits(fit(volume, options).field, usual.field));
+  const auto run = [&] { return fit(volume, options).field; };
+  EXPECT_TRUE(test::sameBits(test::onThreads(1, run), run()));
 }
 
 TEST(FitInChunks, GivesTheSameBitsOnSeveralWorkers) {

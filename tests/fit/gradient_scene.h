@@ -14,23 +14,13 @@
 #include "fit/adam.h"
 #include "fit/ellipsoid.h"
 #include "fit/target.h"
+#include "fit/volumes.h"
 
 namespace esvr::test {
 
 inline constexpr int kSide = 32;  // voxels
 
-inline SparseVolume denseVolume() {
-  std::vector<BrickInput> bricks;
-  Random random(5);
-  for (int b = 0; b < 64; ++b) {
-    BrickInput brick;
-    brick.corner = Coord{b / 16, b / 4 % 4, b % 4} * kBrickSide;
-    for (float& v : brick.values) v = float(random(0.0, 1.0));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), 0.0f);
-}
+inline SparseVolume denseVolume() { return randomBricks(cornersOfCube(kSide / kBrickSide), 5); }
 
 inline std::vector<Ellipsoid> randomEllipsoids(std::size_t n, double smallest, double aspect) {
   const Field field = randomField(
@@ -113,13 +103,7 @@ class SmallTarget {
  private:
   static SparseVolume randomVolume() {
     Random random(5);
-    std::vector<BrickInput> bricks(8);
-    for (int b = 0; b < 8; ++b) {
-      bricks[b].corner = Coord{b / 4, b / 2 % 2, b % 2} * kBrickSide;
-      for (float& v : bricks[b].values) v = float(random(-1.0, 1.0));
-      bricks[b].active.setAll();
-    }
-    return makeVolume(std::move(bricks), 0.0f);
+    return fullBricks(cornersOfCube(2), 0.0f, [&](Coord) { return random(-1.0, 1.0); });
   }
   SparseVolume volume_;
   FitTarget target_;

@@ -235,7 +235,13 @@ TEST_P(OptimiserOn, GivesTheSameBitsInThreeRuns) {
 }
 
 TEST_P(OptimiserOn, AFarPlaceChangesNoBit) {
-  EXPECT_TRUE(test::sameBits(fitAt({}), fitAt({1 << 20, -(1 << 20), 1 << 20})));
+  const Field here = fitAt({});
+  for (const Coord shift :
+       {Coord{1 << 20, -(1 << 20), 1 << 20}, Coord{10'000'000, -10'000'000, 8}}) {
+    const Field there = fitAt(shift);
+    EXPECT_TRUE(test::sameBits(here, there));
+    EXPECT_EQ(there.chunks[0].origin, here.chunks[0].origin + shift);
+  }
 }
 
 ESVR_ON_DEVICES(OptimiserOn);

@@ -22,6 +22,7 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
+#include "fit/volumes.h"
 #include "format/bytes.h"
 #include "format/sample_files.h"
 #include "format/section_reader.h"
@@ -373,16 +374,11 @@ TEST(Limits, MetadataThatIsWideInMemoryIsRefused) {
 }
 
 TEST(Limits, SlowVoxelsThatCostNextToNothingAreRefused) {
-  std::vector<BrickInput> bricks;
-  for (int i = 0; i < 2000; ++i) {
-    BrickInput brick{{8 * (i % 100), 8 * (i / 100), 0}, {}, {}};
-    brick.values.fill(1.0f);
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
+  std::vector<Coord> corners;
+  for (int i = 0; i < 2000; ++i) corners.push_back({8 * (i % 100), 8 * (i / 100), 0});
   StoredGrid grid = emptyGrid();
   grid.field.background = 0.0f;
-  grid.voxels = exactLayer(makeVolume(std::move(bricks), 0.0f));
+  grid.voxels = exactLayer(fullBricks(corners, 0.0f, [](Coord) { return 1.0f; }));
   const EsvrFile file = fileOf(grid);
   EXPECT_LT(encodeEsvr(file).size(), 8'000u);
   expectRefused(file, 8 * kMegabyte);

@@ -12,6 +12,7 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/sequence_file.h"
+#include "fit/volumes.h"
 #include "format/bytes.h"
 #include "format/non_finite_section.h"
 #include "format/section_writer.h"
@@ -218,6 +219,20 @@ StoredGrid layeredGrid(std::size_t ellipsoidsPerChunk) {
   return grid;
 }
 
+StoredGrid corrected(StoredGrid grid) {
+  VoxelLayer& residual = grid.residual.emplace();
+  residual.form = VoxelForm::kQuantised;
+  residual.divisor = 64.0;
+  residual.origin = {8, -24, 1024};
+  residual.bricks = {{}};
+  residual.codes.resize(kBrickVoxels);
+  residual.codes[0] = 3, residual.codes[77] = -2, residual.codes[511] = 1;
+  residual.active.resize(1);
+  residual.active[0].setAll();
+  residual.vacant.resize(1);
+  return grid;
+}
+
 StoredGrid emptyGrid() {
   StoredGrid grid;
   grid.descriptor.background = grid.field.background = 1.0f;
@@ -300,16 +315,12 @@ StoredGrid oneEllipsoid() {
 
 /// A ramp of a few values in two bricks, with an inactive voxel that is not the background.
 StoredGrid fewValues() {
-  std::vector<BrickInput> bricks(2);
-  for (std::size_t b = 0; b < bricks.size(); ++b) {
-    bricks[b].corner = {-8, 16, std::int32_t(b) * kBrickSide};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const Coord at = bricks[b].corner + voxelLocal(v);
-      bricks[b].values[std::size_t(v)] = float((at.x + at.y * at.z / 4) & 15) * 0.125f;
-      if (at.z > 2 || at == Coord{-5, 18, 1}) bricks[b].active.set(v);
-    }
-  }
-  const SparseVolume volume = makeVolume(bricks, 0.125f);
+  const SparseVolume volume = bricksAt(
+      {{-8, 16, 0}, {-8, 16, 8}}, 0.125f,
+      [](Coord at) { return float((at.x + at.y * at.z / 4) & 15) * 0.125f; },
+      [](Coord at) {
+        return at.z > 2 || at == Coord{-5, 18, 1};
+      });
   return makeStoredVoxels({}, volume, exactLayer(volume));
 }
 
@@ -336,35 +347,30 @@ VoxelLayer asFloats(VoxelLayer layer) {
 
 /// 16 x 8 x 8 floats that are equal under a mirror along x but for one voxel, many of them 0.5.
 StoredGrid mirroredValues() {
-  std::vector<BrickInput> bricks(2);
-  for (std::size_t b = 0; b < bricks.size(); ++b) {
-    bricks[b].corner = {std::int32_t(b) * kBrickSide, -8, 8};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const Coord at = bricks[b].corner + voxelLocal(v);
-      const std::int32_t x = std::min(at.x, 15 - at.x);
-      const std::int32_t n = (x * 64 + (at.y + 8) * 8 + at.z - 8) * 37 % 512;
-      bricks[b].values[std::size_t(v)] =
-          at.z % 3 == 0 || at == Coord{9, -6, 10} ? 0.5f : 1.0f + float(n) * float(n) / 65536.0f;
-      if (x > 1 || n % 5 != 0) bricks[b].active.set(v);
-    }
-  }
-  const SparseVolume volume = makeVolume(bricks, 0.0f);
+  const auto fromBorder = [](Coord at) { return std::min(at.x, 15 - at.x); };
+  const auto number = [&](Coord at) {
+    return (fromBorder(at) * 64 + (at.y + 8) * 8 + at.z - 8) * 37 % 512;
+  };
+  const auto value = [&](Coord at) {
+    const auto n = float(number(at));
+    return at.z % 3 == 0 || at == Coord{9, -6, 10} ? 0.5f : 1.0f + n * n / 65536.0f;
+  };
+  const SparseVolume volume = bricksAt({{0, -8, 8}, {8, -8, 8}}, 0.0f, value, [&](Coord at) {
+    return fromBorder(at) > 1 || number(at) % 5 != 0;
+  });
   return makeStoredVoxels({}, volume, asFloats(exactLayer(volume)));
 }
 
 /// 32 x 8 x 16 floats that repeat along z after a brick and are equal under a mirror along x.
 StoredGrid copiedValues() {
-  std::vector<BrickInput> bricks(8);
-  for (std::size_t b = 0; b < bricks.size(); ++b) {
-    bricks[b].corner = Coord{std::int32_t(b / 2), 2, std::int32_t(b % 2)} * kBrickSide;
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const Coord at = bricks[b].corner + voxelLocal(v);
-      const std::int32_t n = std::min(at.x, 31 - at.x) * 64 + (at.y & 7) * 8 + (at.z & 7);
-      bricks[b].values[std::size_t(v)] = float(n * n % 11);
-      if (n % 5 != 0) bricks[b].active.set(v);
-    }
-  }
-  const SparseVolume volume = makeVolume(bricks, 0.0f);
+  std::vector<Coord> corners;
+  for (int b = 0; b < 8; ++b) corners.push_back(Coord{b / 2, 2, b % 2} * kBrickSide);
+  const auto number = [](Coord at) {
+    return std::min(at.x, 31 - at.x) * 64 + (at.y & 7) * 8 + (at.z & 7);
+  };
+  const SparseVolume volume = bricksAt(
+      corners, 0.0f, [&](Coord at) { return float(number(at) * number(at) % 11); },
+      [&](Coord at) { return number(at) % 5 != 0; });
   return makeStoredVoxels({}, volume, asFloats(exactLayer(volume)));
 }
 
@@ -411,22 +417,6 @@ EsvrFile vectors() {
     file.grids[1 + c].descriptor.name = componentName("velocity", c);
   file.vectors = {{"velocity", 1}};
   return file;
-}
-
-/// An ellipsoid with a residual that corrects three voxels of a brick.
-StoredGrid corrected() {
-  StoredGrid grid = oneEllipsoid();
-  VoxelLayer& residual = grid.residual.emplace();
-  residual.form = VoxelForm::kQuantised;
-  residual.divisor = 64.0;
-  residual.origin = {8, -24, 1024};
-  residual.bricks = {{}};
-  residual.codes.resize(kBrickVoxels);
-  residual.codes[0] = 3, residual.codes[77] = -2, residual.codes[511] = 1;
-  residual.active.resize(1);
-  residual.active[0].setAll();
-  residual.vacant.resize(1);
-  return grid;
 }
 
 /// Twice the few values plus a half, with the few values as reference, and other values without one.
@@ -484,7 +474,7 @@ std::vector<GoldenFile> goldenFiles() {
       {"box_voxels", fileOf(withBoxVoxels())},
       {"tone", fileOf(withTone())},
       {"twins", twins()},
-      {"residual", fileOf(corrected())},
+      {"residual", fileOf(corrected(oneEllipsoid()))},
       {"carried",
        {{}, {oneEllipsoid()}, {carriedGrid(0, "vectors"), carriedGrid(2, "more vectors")}}},
       {"vector_grid", vectors()},

@@ -41,6 +41,9 @@ struct EllipsoidParts {
 /// The same in importance layers: four for each chunk if there are enough precisions.
 [[nodiscard]] StoredGrid layeredGrid(std::size_t ellipsoidsPerChunk);
 
+/// The ellipsoids of a grid with a residual that corrects three voxels of a brick.
+[[nodiscard]] StoredGrid corrected(StoredGrid grid);
+
 /// A grid with a background and nothing else.
 [[nodiscard]] StoredGrid emptyGrid();
 

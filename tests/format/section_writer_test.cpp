@@ -20,6 +20,7 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "fit/volumes.h"
 #include "format/bytes.h"
 #include "format/sample_files.h"
 #include "format/section_table.h"
@@ -76,14 +77,10 @@ TEST(SectionWriter, StoresSectionsThatDifferInABitApart) {
 }
 
 StoredGrid voxelGrid(float background) {
-  std::vector<BrickInput> bricks(2);
-  for (std::size_t b = 0; b < bricks.size(); ++b) {
-    bricks[b].corner = {0, 0, std::int32_t(b) * kBrickSide};
-    for (int v = 0; v < kBrickVoxels; ++v)
-      bricks[b].values[std::size_t(v)] = float(v * v % 997) * 0.125f;
-    bricks[b].active.setAll();
-  }
-  const SparseVolume volume = makeVolume(bricks, background);
+  const SparseVolume volume = fullBricks({{0, 0, 0}, {0, 0, 8}}, background, [](Coord at) {
+    const int v = voxelOffset(localOf(at));
+    return float(v * v % 997) * 0.125f;
+  });
   return makeStoredVoxels({}, volume, exactLayer(volume));
 }
 
@@ -110,19 +107,6 @@ struct Sample {
 };
 void PrintTo(const Sample& sample, std::ostream* out) { *out << sample.name; }
 
-StoredGrid correctedGrid() {
-  StoredGrid grid = quantisedGrid(20);
-  VoxelLayer& residual = grid.residual.emplace();
-  residual.form = VoxelForm::kQuantised;
-  residual.divisor = 64.0;
-  residual.bricks = {{}};
-  for (int v = 0; v < kBrickVoxels; ++v) residual.codes.push_back(v * v % 7 - 3);
-  residual.active.resize(1);
-  residual.active[0].setAll();
-  residual.vacant.resize(1);
-  return grid;
-}
-
 class GridWithATwin : public testing::TestWithParam<Sample> {};
 
 TEST_P(GridWithATwin, AddsItsRecordAndRowsOnly) {
@@ -141,12 +125,14 @@ TEST_P(GridWithATwin, ComesBackWithBothDescriptors) {
   EXPECT_EQ(lossOf(withTwin(GetParam().grid)), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, GridWithATwin,
-    testing::Values(Sample{"planes", fogGrid(200)}, Sample{"bricks", levelSetGrid(20)},
-                    Sample{"chunks", chunkedGrid(30)}, Sample{"quantised", quantisedGrid(100)},
-                    Sample{"layered", layeredGrid(100)}, Sample{"residual", correctedGrid()},
-                    Sample{"voxels", voxelGrid(0.0f)}));
+INSTANTIATE_TEST_SUITE_P(All, GridWithATwin,
+                         testing::Values(Sample{"planes", fogGrid(200)},
+                                         Sample{"bricks", levelSetGrid(20)},
+                                         Sample{"chunks", chunkedGrid(30)},
+                                         Sample{"quantised", quantisedGrid(100)},
+                                         Sample{"layered", layeredGrid(100)},
+                                         Sample{"residual", corrected(quantisedGrid(20))},
+                                         Sample{"voxels", voxelGrid(0.0f)}));
 
 TEST(GridsWithTheSameData, HaveTheirPartsRead) {
   const TemporaryFolder folder;

@@ -150,21 +150,12 @@ TEST(CompareVolumes, theDefaultBoxIsTheReferencesActiveBox) {
 /// The level set of a sphere. Voxels whose distance is `band` or more are inactive.
 SparseVolume sphere(float band) {
   constexpr float kBackground = 3.0f;
-  constexpr int kReach = 4;  // bricks
-  std::vector<BrickInput> bricks;
-  for (int n = 0; n < 8 * kReach * kReach * kReach; ++n) {
-    const Coord place{n % (2 * kReach), n / (2 * kReach) % (2 * kReach), n / (4 * kReach * kReach)};
-    BrickInput brick{(place - Coord{kReach, kReach, kReach}) * kBrickSide, {}, {}};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const Coord at = brick.corner + voxelLocal(v);
-      const auto distance = float(std::hypot(at.x, at.y, at.z)) - 26.0f;
-      const bool active = std::abs(distance) < band;
-      brick.values[std::size_t(v)] = active ? distance : std::copysign(kBackground, distance);
-      if (active) brick.active.set(v);
-    }
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), kBackground);
+  const auto distance = [](Coord at) { return float(std::hypot(at.x, at.y, at.z)) - 26.0f; };
+  const auto isActive = [&](Coord at) { return std::abs(distance(at)) < band; };
+  const auto value = [&](Coord at) {
+    return isActive(at) ? distance(at) : std::copysign(kBackground, distance(at));
+  };
+  return test::bricksAt(test::cornersOfCube(8, {-32, -32, -32}), kBackground, value, isActive);
 }
 
 TEST(CompareVolumes, theInsideOfALevelSetNeedsNoBricks) {
@@ -388,10 +379,7 @@ INSTANTIATE_TEST_SUITE_P(All, KnownAnswers,
 
 /// A brick whose voxels all have this value.
 SparseVolume constant(float value) {
-  BrickInput brick{{}, {}, {}};
-  brick.values.fill(value);
-  brick.active.setAll();
-  return makeVolume({brick}, 0.0f);
+  return test::fullBricks({Coord{}}, 0.0f, [&](Coord) { return value; });
 }
 
 VectorVolume constants(float x, float y, float z) {
@@ -543,15 +531,10 @@ TEST(CompareSigns, IgnoresTheMagnitude) {
 TEST(CompareSigns, KnowsTheSideOfEmptySpace) {
   const SparseVolume band = test::levelSetVolume();
   const auto with = [&](Coord place, float value) {
-    std::vector<BrickInput> bricks(1);
-    bricks[0].corner = place * kBrickSide;
-    bricks[0].values.fill(value);
-    bricks[0].active.setAll();
-    for (std::size_t b = 0; b < band.brickCount(); ++b) {
-      BrickInput own{band.brickCorner(b), {}, band.active[b]};
-      std::ranges::copy(band.brickValues(b), own.values.begin());
-      bricks.push_back(own);
-    }
+    std::vector<BrickInput> bricks = test::bricksOf(band);
+    BrickInput& more = bricks.emplace_back(BrickInput{place * kBrickSide, {}, {}});
+    more.values.fill(value);
+    more.active.setAll();
     return makeVolume(std::move(bricks), band.background);
   };
   const Coord inside{2, 2, 2}, outside{-1, 2, 2};

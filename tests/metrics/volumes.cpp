@@ -4,15 +4,10 @@
 #include <cmath>
 #include <map>
 
+#include "fit/volumes.h"
+
 namespace esvr::test {
 namespace {
-
-template <class Visit>
-void forEachVoxel(const Box& box, Visit visit) {
-  for (int x = box.min.x; x <= box.max.x; ++x)
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z});
-}
 
 BrickInput emptyBrick(Coord brick, float background) {
   BrickInput input{.corner = brick * kBrickSide, .values = {}, .active = {}};

@@ -1,9 +1,12 @@
 """Arrays become volumes and come back; wrong arrays are refused; files of OpenVDB are read and written. NaN and
 infinite voxels are refused by default, and kept where they were with nonfinite='keep'."""
+import sys
+
 import numpy as np
 import pytest
 
 import esvr
+from esvr import _openvdb
 
 
 def test_an_array_comes_back(ball, volume):
@@ -153,6 +156,13 @@ def test_a_grid_that_is_missing_is_named(tmp_path, volume):
     volume.save(path)
     with pytest.raises(esvr.BadInput, match="temperature"):
         esvr.Volume.from_vdb(path, "temperature")
+
+
+def test_without_openvdb_the_package_is_named(volume, monkeypatch):
+    for name in _openvdb.MODULES:
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ImportError, match="python3-openvdb"):
+        volume.to_pyopenvdb()
 
 
 def test_real_files_are_read(data):

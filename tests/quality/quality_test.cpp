@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/run_program.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {
@@ -70,7 +71,7 @@ void setTolerancesIn(const std::string& path, double bytesTolerance) {
 class RealFileQuality : public testing::TestWithParam<RealFile> {
  protected:
   void SetUp() override {
-    if (std::string(ESVR_DATA_DIR).empty()) GTEST_SKIP() << "ESVR_DATA_DIR is not set";
+    ESVR_NEEDS_DATA();
     if (!std::filesystem::exists(source())) GTEST_SKIP() << "no file " << source();
   }
   [[nodiscard]] std::string source() const {

@@ -426,9 +426,7 @@ TEST(LevelOfDetail, CellsAndVolumesAgree) {
 }
 
 TEST(LevelOfDetail, PicturesAreCloserToThoseWithManyRays) {
-  std::vector<Coord> corners;
-  for (int n = 0; n < 512; ++n) corners.push_back(Coord{n / 64, n / 8 % 8, n % 8} * kBrickSide);
-  const SparseVolume volume = randomBricks(corners, 7);
+  const SparseVolume volume = randomBricks(cornersOfCube(8), 7);
   RenderOptions o = withLevels(volume);
   o.resolution = {12, 12};
   o.camera.height = 72.0;

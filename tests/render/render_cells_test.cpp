@@ -21,9 +21,7 @@
 
 #include "esvr/error.h"
 #include "esvr/field.h"
-#include "esvr/fit.h"
 #include "esvr/render.h"
-#include "esvr/vdb_io.h"
 #include "field/random_field.h"
 #include "render/reference_picture.h"
 #include "render/render_cells.h"
@@ -185,10 +183,7 @@ TEST(RenderCells, DrawsEllipsoidsThatLieFarApart) {
 TEST(RenderCells, IsTheSameForAnyNumberOfThreads) {
   const Field field = randomField({.count = 300});
   const RenderOptions o = cellOptions({}, {130, 70});
-  const auto draw = [&] { return renderField(field, o).rgba; };
-  const auto one = onThreads(1, draw);
-  EXPECT_EQ(one, onThreads(2, draw));
-  EXPECT_EQ(one, onThreads(5, draw));
+  expectSameOnAnyThreads([&] { return renderField(field, o).rgba; });
 }
 
 // Levels of detail.
@@ -259,33 +254,12 @@ TEST(RenderCells, CoarserLevelsOfMasksAreMeans) {
 
 TEST(RenderCells, CoarserLevelsAreTheSameForAnyNumberOfThreads) {
   const FarCloud cloud(1);
-  const auto draw = [&] { return renderField(cloud.field, cloud.options).rgba; };
-  const auto one = onThreads(1, draw);
-  EXPECT_EQ(one, onThreads(2, draw));
-  EXPECT_EQ(one, onThreads(5, draw));
+  expectSameOnAnyThreads([&] { return renderField(cloud.field, cloud.options).rgba; });
 }
 
 TEST(RenderCells, NothingToSeeIsTransparent) {
   expectTransparent(renderField(randomField({}), cellOptions(away())));
   expectTransparent(renderField(Field{}, cellOptions()));
-}
-
-/// A short fit, in which many ellipsoids are smaller than a voxel.
-TEST(RenderCells, RealFileAgreesWithItsVoxelsAtEveryStep) {
-  if (std::string(ESVR_DATA_DIR).empty())
-    GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>";
-  const VolumeGrid grid = readGrid(std::string(ESVR_DATA_DIR) + "/aneurism.vdb", "density");
-  FitOptions options;
-  options.count = 3000, options.iterations = 60;
-  const FitResult fitted = fit(grid.volume, options);
-  const RevoxeliseOptions rule{.threshold = 0.02f};
-  const SparseVolume voxels = revoxelise(fitted.field, rule);
-  RenderOptions o = pictureOf(activeBox(grid.volume), {200, 200}, 1.0);
-  o.transfer = viridis(activeRange(grid.volume));
-  for (const double step : {0.25, 0.5, 1.0, 2.0}) {
-    o.step = step;
-    EXPECT_GE(imagePsnr(renderVolume(voxels, o), renderField(fitted.field, o, rule)), 60.0) << step;
-  }
 }
 
 // ---- Pictures in passes

@@ -114,8 +114,7 @@ TEST(RenderVolume, EmptySpaceIsTransparentWhateverItsOpacity) {
 
 TEST(RenderVolume, IsTheSameForAnyNumberOfThreads) {
   const auto volume = scattered();
-  const auto draw = [&] { return renderVolume(volume, optionsFor(volume)).rgba; };
-  EXPECT_EQ(onThreads(1, draw), onThreads(3, draw));
+  expectSameOnAnyThreads([&] { return renderVolume(volume, optionsFor(volume)).rgba; });
 }
 
 TEST(RenderVolume, NoVoxelsGiveAnEmptyPicture) {
@@ -392,8 +391,7 @@ TEST(RenderGrids, FourGridsAreDrawn) {
 
 TEST(RenderGrids, AreTheSameForAnyNumberOfThreads) {
   const TwoVolumes two;
-  const auto draw = [&] { return two.drawn().rgba; };
-  EXPECT_EQ(onThreads(1, draw), onThreads(3, draw));
+  expectSameOnAnyThreads([&] { return two.drawn().rgba; });
 }
 
 TEST(RenderGrids, RefuseWhatTheyDoNotHave) {

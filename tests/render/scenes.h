@@ -1,14 +1,13 @@
 #pragma once
 /// What the tests draw: volumes of full bricks, fields, cameras and the options of pictures.
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
 #include "esvr/field.h"
 #include "esvr/render.h"
-#include "field/random_field.h"
+#include "fit/volumes.h"
 
 namespace esvr::test {
 
@@ -51,39 +50,7 @@ inline CameraWish away() { return {.eye = Vec3{20, 20, 200}, .center = Vec3{20, 
 /// A cube of so many bricks a side, whose voxels have the values of a function of their places.
 template <class Value>
 SparseVolume cubeOf(int side, float background, const Value& value) {
-  std::vector<BrickInput> bricks;
-  for (int n = 0; n < side * side * side; ++n) {
-    BrickInput brick{Coord{n / (side * side), n / side % side, n % side} * kBrickSide, {}, {}};
-    for (int v = 0; v < kBrickVoxels; ++v)
-      brick.values[std::size_t(v)] = float(value(brick.corner + voxelLocal(v)));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), background);
-}
-
-/// Bricks at these corners, full of random values from 0 to 1.
-inline SparseVolume randomBricks(const std::vector<Coord>& corners, std::uint64_t seed,
-                                 float background = 0.0f) {
-  Random random(seed);
-  std::vector<BrickInput> bricks;
-  for (const Coord corner : corners) {
-    BrickInput brick{corner, {}, {}};
-    for (float& v : brick.values) v = float(random(0.0, 1.0));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), background);
-}
-
-/// The bricks of a volume, of which another one can be made.
-inline std::vector<BrickInput> bricksOf(const SparseVolume& volume) {
-  std::vector<BrickInput> bricks;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    bricks.push_back({volume.brickCorner(b), {}, volume.active[b]});
-    std::copy_n(volume.brickValues(b).begin(), kBrickVoxels, bricks.back().values.begin());
-  }
-  return bricks;
+  return fullBricks(cornersOfCube(side), background, value);
 }
 
 inline RenderOptions optionsFor(const SparseVolume& volume, const CameraWish& wish = {}) {

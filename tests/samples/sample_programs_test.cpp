@@ -7,6 +7,7 @@
 
 #include "cli/run_program.h"
 #include "esvr/vdb_io.h"
+#include "support/machine.h"
 
 namespace esvr {
 namespace {
@@ -253,7 +254,7 @@ TEST(Swc2Vdb, refusesASkeletonThatIsNotThere) {
 }
 
 TEST(Swc2Vdb, RealFilesOfSkeletonsBecomeThinTubes) {
-  if (std::string(ESVR_DATA_DIR).empty()) GTEST_SKIP() << "ESVR_DATA_DIR is not set";
+  ESVR_NEEDS_DATA();
   for (const char* name : {"m207", "hemibrain_754538881"}) {
     const TemporaryFolder folder;
     const std::string in = std::string(ESVR_DATA_DIR) + "/swc/" + name + ".swc";

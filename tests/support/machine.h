@@ -37,6 +37,11 @@ class OnDevice : public testing::TestWithParam<const char*> {
 
 }  // namespace esvr::test
 
+/// Skips the running test if no folder of real volumes is configured.
+#define ESVR_NEEDS_DATA()     \
+  if (*ESVR_DATA_DIR == '\0') \
+  GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>"
+
 #define ESVR_ON_DEVICES(Suite)                                             \
   INSTANTIATE_TEST_SUITE_P(Devices, Suite, testing::Values("cpu", "cuda"), \
                            [](const auto& device) { return std::string(device.param); })
@@ -48,6 +53,14 @@ template <class Make>
 auto onThreads(std::size_t threads, const Make& make) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
   return make();
+}
+
+/// Expects that `make` returns the same on any number of threads.
+template <class Make>
+void expectSameOnAnyThreads(const Make& make) {
+  const auto one = onThreads(1, make);
+  for (const std::size_t threads : {2, 5})
+    EXPECT_TRUE(onThreads(threads, make) == one) << threads << " threads";
 }
 
 #if defined(__has_feature)

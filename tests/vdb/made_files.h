@@ -10,8 +10,10 @@
 #include <vector>
 
 #include "esvr/vdb_io.h"
+#include "fit/volumes.h"
 #include "metrics/volumes.h"
 #include "support/files.h"
+#include "support/machine.h"
 
 namespace esvr::test {
 
@@ -38,26 +40,11 @@ void saveCompressed(const std::filesystem::path& path, const openvdb::GridPtrVec
 /// Reads one grid with OpenVDB's own reader.
 openvdb::GridBase::Ptr load(const std::filesystem::path& path, const std::string& name);
 
-/// The inactive values of a tree that are not its background, as OpenVDB iterates over them.
-template <class Grid>
-InactiveValues inactiveIn(const Grid& grid) {
-  InactiveValues found;
-  for (auto value = grid.cbeginValueOff(); value; ++value) {
-    if (*value == grid.background()) continue;
-    openvdb::CoordBBox box;
-    value.getBoundingBox(box);
-    const auto corner = [](const openvdb::Coord& c) { return Coord{c.x(), c.y(), c.z()}; };
-    found.add(double(*value), Box{corner(box.min()), corner(box.max())});
-  }
-  return found;
-}
-
 /// A grid with these active voxels, in any order; the rest is background.
 VolumeGrid gridOf(const std::string& name, const std::vector<Voxel>& voxels,
                   float background = 0.0f);
 
-// Fail unless the bits are the same.
-void expectSameBits(const SparseVolume& actual, const SparseVolume& expected);
+/// Fails unless the descriptors and the bits of the voxels are the same.
 void expectSame(const VolumeGrid& actual, const VolumeGrid& expected);
 
 /// Reads all grids of a file; they must be sound and finite.
@@ -65,7 +52,3 @@ void expectSame(const VolumeGrid& actual, const VolumeGrid& expected);
 bool readable(const std::filesystem::path& path, const ReadOptions& options);
 
 }  // namespace esvr::test
-
-#define ESVR_NEEDS_DATA()            \
-  if (esvr::test::dataDir().empty()) \
-  GTEST_SKIP() << "needs the real volumes: configure with -DESVR_DATA_DIR=<their folder>"

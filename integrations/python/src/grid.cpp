@@ -143,8 +143,9 @@ Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
 
 void addGrid(py::module_& module) {
   addEllipsoids(module);
-  py::class_<Grid>(module, "Grid", "A grid of an .esvr file: a sum of ellipsoids, or voxels.")
-      .def(
+  py::class_<Grid> type(module, "Grid", "A grid of an .esvr file: a sum of ellipsoids, or voxels.");
+  addDescriptor(type);
+  type.def(
           "to_volume",
           [](const Grid& grid, const std::optional<PlainBox>& box,
              const std::optional<std::uint64_t>& maxMemory, std::optional<double> coarsen,
@@ -166,12 +167,6 @@ void addGrid(py::module_& module) {
       .def_property_readonly(
           "ellipsoid_count", [](const Grid& g) { return g.grid->field.ellipsoidCount(); },
           "Number of ellipsoids; 0 if the grid stores voxels.")
-      .def_property_readonly(
-          "name", [](const Grid& g) { return g.grid->descriptor.name; },
-          "The name of the grid, which other grids of its file may have, too.")
-      .def_property_readonly(
-          "grid_class", [](const Grid& g) { return className(g.grid->descriptor.gridClass); },
-          "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
       .def_property_readonly(
           "kind", [](const Grid& g) { return kindOf(*g.grid); },
           "\"ellipsoids\", \"ellipsoids with a residual\" or \"voxels\".")
@@ -198,12 +193,8 @@ void addGrid(py::module_& module) {
           },
           "The scale s of the tone curve: values are s sinh(sum / s); None without one.")
       .def_property_readonly(
-          "transform", [](const Grid& g) { return matrixOf(g.grid->descriptor.transform); },
-          "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
-      .def_property_readonly(
           "bytes", [](const Grid& g) { return bytesAdded(*g.grid); },
-          "Largest number of bytes that the grid adds to a file.")
-      .def("__repr__", [](const Grid& g) { return describe(g); });
+          "Largest number of bytes that the grid adds to a file.");
 }
 
 // esvr.fit and esvr.convert.

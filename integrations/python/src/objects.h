@@ -102,6 +102,22 @@ using Matrix = std::array<std::array<double, 4>, 4>;
 /// The matrix from index to world coordinates, for column vectors; None for a frustum.
 [[nodiscard]] py::object matrixOf(const Transform& transform);
 
+/// Adds what Volume, PackedGrid and Grid have of the descriptors of their grids, and what repr() says of them.
+template <class T>
+void addDescriptor(py::class_<T>& type) {
+  type.def_property_readonly(
+          "name", [](const T& object) { return object.grid->descriptor.name; },
+          "The name of the grid, which other grids of its file may have, too.")
+      .def_property_readonly(
+          "grid_class",
+          [](const T& object) { return className(object.grid->descriptor.gridClass); },
+          "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
+      .def_property_readonly(
+          "transform", [](const T& object) { return matrixOf(object.grid->descriptor.transform); },
+          "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
+      .def("__repr__", [](const T& object) { return describe(object); });
+}
+
 /// What the argument `nonfinite` says. \throws UsageError  it is neither 'refuse' nor 'keep'
 [[nodiscard]] NonFinite nonFiniteOf(const std::string& word);
 

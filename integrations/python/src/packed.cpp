@@ -487,10 +487,12 @@ void addBuilder(py::module_& module) {
 }
 
 void addPackedGrid(py::module_& module) {
-  py::class_<Packed>(module, "PackedGrid",
-                     "The active voxels of a grid of numbers, truth values or vectors, with all "
-                     "their bits.")
-      .def_static(
+  py::class_<Packed> type(
+      module, "PackedGrid",
+      "The active voxels of a grid of numbers, truth values or vectors, with all "
+      "their bits.");
+  addDescriptor(type);
+  type.def_static(
           "from_file", &fromFile, py::arg("path"), py::arg("grid") = py::none(), py::kw_only(),
           py::arg("frame") = py::none(), py::arg("max_memory") = py::none(),
           "Reads a grid of a .vdb, .nvdb or .esvr file, of which it decodes the voxels.\n\n"
@@ -508,13 +510,8 @@ void addPackedGrid(py::module_& module) {
            "Which voxels of a box are active: bool with the axes x, y, z.")
       .def("to_volume", &toVolume, "A volume with the voxels of a grid of floats.")
       .def_property_readonly(
-          "name", [](const Packed& p) { return p.grid->descriptor.name; }, "The name of the grid.")
-      .def_property_readonly(
           "value_type", [](const Packed& p) { return valueTypeOf(*p.grid); },
           "\"float\", \"double\", \"int32\", \"int64\", \"bool\" or \"vec3s\".")
-      .def_property_readonly(
-          "grid_class", [](const Packed& p) { return className(p.grid->descriptor.gridClass); },
-          "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
       .def_property_readonly(
           "background", [](const Packed& p) { return backgroundOf(*p.grid); },
           "The value of voxels that are not active.")
@@ -525,12 +522,8 @@ void addPackedGrid(py::module_& module) {
           "box", [](const Packed& p) { return plainBox(activeBox(*p.grid)); },
           "The first and the last active voxel along each axis; None if there is none.")
       .def_property_readonly(
-          "transform", [](const Packed& p) { return matrixOf(p.grid->descriptor.transform); },
-          "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
-      .def_property_readonly(
           "metadata", [](const Packed& p) { return dictOf(p.grid->descriptor.metadata); },
-          "The grid's metadata that are texts, numbers, truth values or three numbers.")
-      .def("__repr__", [](const Packed& p) { return describe(p); });
+          "The grid's metadata that are texts, numbers, truth values or three numbers.");
 }
 
 }  // namespace

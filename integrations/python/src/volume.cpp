@@ -368,9 +368,10 @@ NonFinite nonFiniteOf(const std::string& word) {
 }
 
 void addVolume(py::module_& module) {
-  py::class_<Volume>(module, "Volume",
-                     "A sparse volume: voxels that are active, and a background elsewhere.")
-      .def_static(
+  py::class_<Volume> type(module, "Volume",
+                          "A sparse volume: voxels that are active, and a background elsewhere.");
+  addDescriptor(type);
+  type.def_static(
           "from_numpy",
           [](const py::object& array, float background, const Corner& origin, float threshold,
              const std::optional<double>& voxelSize, const std::string& name, bool levelSet,
@@ -436,11 +437,6 @@ void addVolume(py::module_& module) {
           },
           py::arg("path"))
       .def_property_readonly(
-          "name", [](const Volume& v) { return v.grid->descriptor.name; }, "The name of the grid.")
-      .def_property_readonly(
-          "grid_class", [](const Volume& v) { return className(v.grid->descriptor.gridClass); },
-          "\"fog volume\", \"level set\", \"staggered\" or \"unknown\".")
-      .def_property_readonly(
           "background", [](const Volume& v) { return v.grid->volume.background; },
           "The value of voxels that are not active.")
       .def_property_readonly(
@@ -471,15 +467,11 @@ void addVolume(py::module_& module) {
           "the\n"
           "range of which --max-error takes a percentage.")
       .def_property_readonly(
-          "transform", [](const Volume& v) { return matrixOf(v.grid->descriptor.transform); },
-          "4 x 4 matrix from index to world coordinates, for column vectors; None for a frustum.")
-      .def_property_readonly(
           "metadata", [](const Volume& v) { return dictOf(v.grid->descriptor.metadata); },
           "The grid's metadata that are texts, numbers, truth values or three numbers.")
       .def_property_readonly(
           "bytes", [](const Volume& v) { return bytesInMemory(v.grid->volume); },
-          "Number of bytes of memory that the voxels take.")
-      .def("__repr__", [](const Volume& v) { return describe(v); });
+          "Number of bytes of memory that the voxels take.");
 }
 
 }  // namespace esvr::python

@@ -35,6 +35,7 @@
 #include "fit/ellipsoid.h"
 #include "fit/gradient_scene.h"
 #include "fit/run.h"
+#include "fit/volumes.h"
 #include "support/stability.h"
 
 #ifdef ESVR_WITH_CUDA
@@ -68,28 +69,7 @@ struct StabilityCase {
 
 using test::randomField;
 using test::RandomFieldOptions;
-
-/// The value of a voxel.
-using ValueAt = std::function<float(Coord)>;
-
-/// A cube of bricks whose voxels are active where they differ from the background, 0.
-SparseVolume cubeOf(int bricks, const ValueAt& valueAt, Coord corner = {}) {
-  std::vector<BrickInput> inputs;
-  for (int n = 0; n < bricks * bricks * bricks; ++n) {
-    BrickInput brick{
-        .corner =
-            corner + Coord{n / (bricks * bricks), n / bricks % bricks, n % bricks} * kBrickSide,
-        .values = {},
-        .active = {}};
-    for (int v = 0; v < kBrickVoxels; ++v) {
-      const float value = valueAt(brick.corner - corner + voxelLocal(v));
-      brick.values[std::size_t(v)] = value;
-      if (value != 0.0f) brick.active.set(v);
-    }
-    inputs.push_back(brick);
-  }
-  return makeVolume(std::move(inputs), 0.0f);
-}
+using test::volumeOf;
 
 /// The voxels of a field.
 std::function<SparseVolume()> voxelsOf(std::function<Field()> field, float threshold = 1e-4f) {
@@ -164,7 +144,7 @@ std::vector<StabilityCase> shapes() {
        },
        test::GradientCase{"subvoxel", {0.1, 0.1, 0.1}, 2.0f},
        FitCase{[] {
-                 return cubeOf(6, [](Coord c) {
+                 return volumeOf({}, 6, 0.0f, [](Coord c) {
                    return c.x % 8 == 3 && c.y % 8 == 3 && c.z % 8 == 3 ? 1.0f : 0.0f;
                  });
                },
@@ -177,7 +157,7 @@ std::vector<StabilityCase> shapes() {
        },
        test::GradientCase{"vast", {300.0, 300.0, 300.0}, 2.0f},
        FitCase{[] {
-                 return cubeOf(5, [](Coord c) {
+                 return volumeOf({}, 5, 0.0f, [](Coord c) {
                    const double m = (std::pow(c.x + 400.0, 2) + c.y * c.y + c.z * c.z) / 9e4;
                    return float(std::exp(-m));
                  });
@@ -284,7 +264,7 @@ std::vector<StabilityCase> places() {
        "voxel, and is of a ball with a radius of 12 voxels.",
        crowd, test::GradientCase{"usual", {2.0, 1.0, 0.6}, 2.0f},
        FitCase{[] {
-                 return cubeOf(4, [](Coord c) {
+                 return volumeOf({}, 4, 0.0f, [](Coord c) {
                    const double r = std::hypot(c.x - 15.0, c.y - 15.0, c.z - 15.0);
                    return float(std::max(0.0, 1.0 - r * r / 144.0));
                  });
@@ -337,13 +317,15 @@ std::vector<StabilityCase> values() {
            "A cube of 24^3 voxels of the value 1.",
            {},
            std::nullopt,
-           FitCase{[] { return cubeOf(3, [](Coord) { return 1.0f; }); }, 200}},
+           FitCase{[] { return volumeOf({}, 3, 0.0f, [](Coord) { return 1.0f; }); }, 200}},
           {"a single voxel",
            "One voxel of the value 1.",
            {},
            std::nullopt,
            FitCase{[] {
-                     return cubeOf(1, [](Coord c) { return c == Coord{3, 4, 5} ? 1.0f : 0.0f; });
+                     return volumeOf({}, 1, 0.0f, [](Coord c) {
+                       return c == Coord{3, 4, 5} ? 1.0f : 0.0f;
+                     });
                    },
                    1}},
           {"a checkerboard",
@@ -351,7 +333,10 @@ std::vector<StabilityCase> values() {
            "smooth primitives: only an ellipsoid for each voxel of value 1 is precise.",
            {},
            std::nullopt,
-           FitCase{[] { return cubeOf(2, [](Coord c) { return float((c.x + c.y + c.z) & 1); }); },
+           FitCase{[] {
+                     return volumeOf({}, 2, 0.0f,
+                                     [](Coord c) { return float((c.x + c.y + c.z) & 1); });
+                   },
                    512}}};
 }
 

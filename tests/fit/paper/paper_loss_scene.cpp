@@ -5,13 +5,6 @@
 namespace esvr::test {
 namespace {
 
-template <class Visit>
-void forEachVoxel(const Box& box, Visit visit) {
-  for (int x = box.min.x; x <= box.max.x; ++x)
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z});
-}
-
 std::array<double, 11> windowWeights() {
   std::array<double, 11> weights;
   double sum = 0.0;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "esvr/volume.h"
-#include "field/random_field.h"
+#include "fit/volumes.h"
 
 namespace esvr::test {
 
@@ -180,13 +180,6 @@ double relativeDifference(const std::vector<A>& values, const std::vector<B>& re
     norm += std::pow(double(reference[i]), 2);
   }
   return std::sqrt(difference / norm);
-}
-
-inline std::vector<Coord> cubeOfBricks(int side) {
-  std::vector<Coord> bricks;
-  for (int i = 0; i < side * side * side; ++i)
-    bricks.push_back({i / (side * side), i / side % side, i % side});
-  return bricks;
 }
 
 }  // namespace esvr::test

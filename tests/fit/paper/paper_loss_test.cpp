@@ -304,18 +304,7 @@ namespace {
 constexpr int kSubvolume = 7;  // the last of 2 x 2 x 2 subvolumes, each a brick
 const Box kBrick{{8, 8, 8}, {15, 15, 15}};
 
-SparseVolume smallVolume() {
-  test::Random random(3);
-  std::vector<BrickInput> bricks;
-  for (int b = 0; b < 8; ++b) {
-    BrickInput brick;
-    brick.corner = Coord{b / 4, b / 2 % 2, b % 2} * kBrickSide;
-    for (float& v : brick.values) v = float(random(0.0, 1.0));
-    brick.active.setAll();
-    bricks.push_back(brick);
-  }
-  return makeVolume(std::move(bricks), 0.0f);
-}
+SparseVolume smallVolume() { return test::randomBricks(test::cornersOfCube(2), 3); }
 
 Population fewEllipsoids() {
   Population population;

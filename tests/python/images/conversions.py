@@ -1,4 +1,5 @@
 """What the tests of image2vdb and vdb2image share: a small image, conversions in this process, and runs of the programs."""
+import contextlib
 import dataclasses
 import os
 import pathlib
@@ -111,6 +112,67 @@ def run(program, *words, **options):
     path = os.pathsep.join([str(pathlib.Path(esvr.__file__).parent.parent)] + sys.path)
     return subprocess.run([sys.executable, "-m", module, *map(str, words)], capture_output=True, text=True, timeout=60,
                           env={**os.environ, "PYTHONPATH": path}, **options)
+
+
+# -- writers of small files, by another tool where there is one ---------------------------------------------------------
+def nrrd(path, fields, data):
+    names = {"uint16": "ushort", "float32": "float", "int32": "int", "uint8": "uchar"}
+    text = f"NRRD0004\ntype: {names[data.dtype.name]}\nencoding: raw\nendian: little\n" + "".join(f"{k}: {v}\n" for k, v in fields)
+    path.write_bytes(text.encode() + b"\n" + np.ascontiguousarray(data).tobytes())
+    return path
+
+
+def nifti(path, data, change=None, matrix=None):
+    nibabel = pytest.importorskip("nibabel")
+    nibabel.save(nibabel.Nifti1Image(data.transpose(*range(data.ndim)[::-1]), tilted() if matrix is None else matrix), path)
+    if change:
+        header = bytearray(path.read_bytes())
+        change(header)
+        path.write_bytes(header)
+    return path
+
+
+def tiff(path, data, **options):
+    tifffile = pytest.importorskip("tifffile")
+    options.setdefault("metadata", None)
+    options.setdefault("photometric", "minisblack")
+    tifffile.imwrite(path, data, **options)
+    return path
+
+
+def geotiff(path, bands, *options):
+    """A file that GDAL writes when the result goes out of scope."""
+    gdal, arrays = pytest.importorskip("osgeo.gdal"), pytest.importorskip("osgeo.gdal_array")
+    return gdal.GetDriverByName("GTiff").CreateCopy(str(path), arrays.OpenArray(np.ascontiguousarray(bands)), options=list(options))
+
+
+def mrc(path, data, order="<", compression=None, **fields):
+    with pytest.importorskip("mrcfile").new(path, compression=compression, overwrite=True) as file:
+        file.set_data(data)
+        file.voxel_size = fields.pop("voxel_size", 1.0)
+        for name, value in fields.items():
+            file.header[name] = value
+    if order == ">":
+        raw = path.read_bytes()
+        words = bytearray(np.frombuffer(raw[:1024], "<u4").astype(">u4").tobytes())
+        words[208:212], words[212:216] = b"MAP ", b"\x11\x11\0\0"
+        path.write_bytes(bytes(words) + data.astype(data.dtype.newbyteorder(">")).tobytes())
+    return path
+
+
+def metaimage(path, fields, data, local=True):
+    lines = [f"{k} = {v}" for k, v in fields.items()] + ["ElementDataFile = LOCAL"] * local
+    path.write_bytes("\n".join(lines + [""]).encode() + data)
+    return path
+
+
+@contextlib.contextmanager
+def netcdf_file(path, dims="zyx", form="NETCDF4"):
+    """A new file whose dimensions have the lengths of ramp()."""
+    with pytest.importorskip("netCDF4").Dataset(path, "w", format=form) as file:
+        for dim, size in zip(dims, (4, 5, 6)):
+            file.createDimension(dim, size)
+        yield file
 
 
 def dicom(folder, values, *, matrix=None, tool=None, change=None, names=None):

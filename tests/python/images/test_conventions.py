@@ -12,7 +12,8 @@ import pytest
 
 import esvr
 
-from conversions import convert, convert_all, dicom, ramp, run, tilted
+from conversions import (convert, convert_all, dicom, geotiff, metaimage, mrc, netcdf_file, nifti, nrrd, ramp, run, tiff,
+                         tilted)
 
 
 def refused(error, match, *words):
@@ -53,13 +54,6 @@ def test_small_files_of_values_RealFile(edge):
 
 
 # -- NRRD --------------------------------------------------------------------------------------------------------------
-def nrrd(path, fields, data):
-    names = {"uint16": "ushort", "float32": "float", "int32": "int", "uint8": "uchar"}
-    text = f"NRRD0004\ntype: {names[data.dtype.name]}\nencoding: raw\nendian: little\n" + "".join(f"{k}: {v}\n" for k, v in fields)
-    path.write_bytes(text.encode() + b"\n" + np.ascontiguousarray(data).tobytes())
-    return path
-
-
 def test_directions_of_nrrd(tmp_path):
     matrix = tilted()
     vectors = " ".join(f"({','.join(repr(n) for n in matrix[:3, k])})" for k in range(3))
@@ -133,16 +127,6 @@ def test_segments_of_nrrd(tmp_path):
 
 
 # -- NIfTI -------------------------------------------------------------------------------------------------------------
-def nifti(path, data, change=None, matrix=None):
-    nibabel = pytest.importorskip("nibabel")
-    nibabel.save(nibabel.Nifti1Image(data.transpose(*range(data.ndim)[::-1]), tilted() if matrix is None else matrix), path)
-    if change:
-        header = bytearray(path.read_bytes())
-        change(header)
-        path.write_bytes(header)
-    return path
-
-
 @pytest.mark.parametrize("slope, intercept, first", [(0.5, 10.0, 10.5), (0.0, 5.0, 1.0), (float("nan"), 5.0, 1.0), (-2.0, 0.0, -2.0)])
 def test_slopes_of_nifti(tmp_path, slope, intercept, first):
     path = nifti(tmp_path / "a.nii", ramp("i2"), lambda h: struct.pack_into("<ff", h, 112, slope, intercept))
@@ -185,14 +169,6 @@ def test_names_members_and_zeros_behind(tmp_path):
 
 
 # -- TIFF --------------------------------------------------------------------------------------------------------------
-def tiff(path, data, **options):
-    tifffile = pytest.importorskip("tifffile")
-    options.setdefault("metadata", None)
-    options.setdefault("photometric", "minisblack")
-    tifffile.imwrite(path, data, **options)
-    return path
-
-
 def test_pages_of_several_calls(tmp_path, tifffile):
     with tifffile.TiffWriter(tmp_path / "a.tif") as file:
         for page in ramp():
@@ -228,11 +204,8 @@ def test_white_is_least_and_colors(tmp_path):
     assert np.array_equal(convert(path, "--channel", 2).values[0], ramp()[0] + 2000)
 
 
-def test_big_endian_floats_with_a_predictor_are_refused(tmp_path, gdal):
-    options = ["COMPRESS=LZW", "PREDICTOR=3", "ENDIANNESS=BIG"]
-    data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_Float32, options)
-    data.GetRasterBand(1).WriteArray(ramp("f4")[0])
-    data = None
+def test_big_endian_floats_with_a_predictor_are_refused(tmp_path):
+    geotiff(tmp_path / "a.tif", ramp("f4")[:1], "COMPRESS=LZW", "PREDICTOR=3", "ENDIANNESS=BIG")
     refused(esvr.BadInput, "big-endian order with predictor 3", tmp_path / "a.tif")
 
 
@@ -287,21 +260,6 @@ def test_slices_of_different_size_are_named(slices):
 
 
 # -- MRC ---------------------------------------------------------------------------------------------------------------
-def mrc(path, data, order="<", **fields):
-    mrcfile = pytest.importorskip("mrcfile")
-    with mrcfile.new(path, overwrite=True) as file:
-        file.set_data(data)
-        file.voxel_size = fields.pop("voxel_size", 1.0)
-        for name, value in fields.items():
-            file.header[name] = value
-    if order == ">":
-        raw = path.read_bytes()
-        words = bytearray(np.frombuffer(raw[:1024], "<u4").astype(">u4").tobytes())
-        words[208:212], words[212:216] = b"MAP ", b"\x11\x11\0\0"
-        path.write_bytes(bytes(words) + data.astype(data.dtype.newbyteorder(">")).tobytes())
-    return path
-
-
 def test_bytes_of_mrc(tmp_path):
     data = (ramp() % 256).astype("u1").view("i1")
     assert np.array_equal(convert(mrc(tmp_path / "a.mrc", data)).values, data)
@@ -325,12 +283,6 @@ def test_no_cell_of_mrc(tmp_path):
 
 
 # -- MetaImage -----------------------------------------------------------------------------------------------------------
-def metaimage(path, fields, data, local=True):
-    lines = [f"{k} = {v}" for k, v in fields.items()] + ["ElementDataFile = LOCAL"] * local
-    path.write_bytes("\n".join(lines + [""]).encode() + data)
-    return path
-
-
 BASE = {"ObjectType": "Image", "NDims": 3, "DimSize": "6 5 4", "ElementType": "MET_USHORT", "ElementSpacing": "0.5 0.75 2"}
 
 
@@ -414,19 +366,15 @@ def test_cells_and_extents_of_vti(tmp_path):
 # -- HDF5 and netCDF -------------------------------------------------------------------------------------------------------
 @pytest.fixture
 def weather(tmp_path):
-    netcdf = pytest.importorskip("netCDF4")
     numbers = iter(range(100))  # the library locks files that are open
 
     def write(kind="i2", data=None, name="t", group=None, fill=None, form="NETCDF4", coordinates=None, **attributes):
         path = tmp_path / f"{next(numbers)}.nc"
-        with netcdf.Dataset(path, "w", format=form) as file:
+        with netcdf_file(path, form=form) as file:
             where = file.createGroup(group) if group else file
-            for dim, size in zip("zyx", (4, 5, 6)):
-                file.createDimension(dim, size)
-                if coordinates:
-                    variable = file.createVariable(dim, "f8", (dim,))
-                    variable[:] = coordinates[dim][0]
-                    variable.units = coordinates[dim][1]
+            for dim, (places, unit) in (coordinates or {}).items():
+                variable = file.createVariable(dim, "f8", (dim,))
+                variable[:], variable.units = places, unit
             variable = where.createVariable(name, kind, ("z", "y", "x"), fill_value=fill)
             variable.set_auto_maskandscale(False)
             for key, value in attributes.items():
@@ -494,10 +442,8 @@ def test_truth_and_complex_values_that_netcdf_leaves_out(tmp_path, h5py):
     refused(esvr.BadInput, "c.h5", tmp_path / "c.h5", "--dataset", "c")
 
 
-def test_coordinates_of_two_dimensions(tmp_path, netcdf):
-    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
-        for dim, size in zip("zyx", (4, 5, 6)):
-            file.createDimension(dim, size)
+def test_coordinates_of_two_dimensions(tmp_path):
+    with netcdf_file(tmp_path / "a.nc") as file:
         file.createVariable("x", "f4", ("y", "x"))[:] = ramp()[0]
         file.createVariable("t", "f4", ("z", "y", "x"))[:] = ramp()
     assert np.array_equal(convert(tmp_path / "a.nc").values, ramp())
@@ -512,22 +458,18 @@ def test_places_of_netcdf(weather):
     assert any("steps of the axis z differ" in text for text in convert(weather("f4", coordinates=where)).warnings)
 
 
-def test_several_variables_are_listed(tmp_path, netcdf):
-    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
-        for dim, size in zip("zyx", (4, 5, 6)):
-            file.createDimension(dim, size)
+def test_several_variables_are_listed(tmp_path):
+    with netcdf_file(tmp_path / "a.nc") as file:
         for name in "uv":
             file.createVariable(name, "f4", ("z", "y", "x"))[:] = ramp() + (1000 if name == "v" else 0)
     refused(esvr.UsageError, r"several images: /u \(4 x 5 x 6 float32\), /v", tmp_path / "a.nc")
     assert convert(tmp_path / "a.nc", "--dataset", "v").values[0, 0, 0] == 1001
 
 
-def test_members_and_bands_are_channels(tmp_path, netcdf):
+def test_members_and_bands_are_channels(tmp_path):
     """As ERA5 and rioxarray write them; a dimension that nobody knows is taken for the one of space that is left, with a warning."""
     for name in ("number", "band", "run"):
-        with netcdf.Dataset(tmp_path / f"{name}.nc", "w") as file:
-            for dim, size in zip((name, "latitude", "longitude"), (4, 5, 6)):
-                file.createDimension(dim, size)
+        with netcdf_file(tmp_path / f"{name}.nc", (name, "latitude", "longitude")) as file:
             file.createVariable("t", "f4", (name, "latitude", "longitude"))[:] = ramp()
     for name in ("number", "band"):
         refused(esvr.UsageError, f"{name}: 4; choose by --channel", tmp_path / f"{name}.nc")
@@ -541,10 +483,8 @@ def test_what_matlab_keeps_for_itself(tmp_path):
     assert np.array_equal(convert(tmp_path / "a.mat").values, ramp())
 
 
-def test_dimensions_in_any_order(tmp_path, netcdf):
-    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
-        for dim, size in zip(("lev", "lat", "lon"), (4, 5, 6)):
-            file.createDimension(dim, size)
+def test_dimensions_in_any_order(tmp_path):
+    with netcdf_file(tmp_path / "a.nc", ("lev", "lat", "lon")) as file:
         file.createVariable("t", "f4", ("lon", "lat", "lev"))[:] = ramp().transpose(2, 1, 0)
     assert np.array_equal(convert(tmp_path / "a.nc").values, ramp())
     with pytest.importorskip("h5py").File(tmp_path / "a.h5", "w") as file:
@@ -795,13 +735,11 @@ def test_integers_that_no_grid_holds_are_refused(tmp_path):
     refused(esvr.BadInput, "beyond 2\\^24", tmp_path / "b.npy", "--as", "float")
 
 
-def test_doubles_hold_larger_integers_and_fill_values_do_not_count(tmp_path, netcdf):
+def test_doubles_hold_larger_integers_and_fill_values_do_not_count(tmp_path):
     np.save(tmp_path / "a.npy", ramp("i8") + 2 ** 40)
     made = convert(tmp_path / "a.npy", "--as", "double")
     assert made.grid.value_type == "double" and np.array_equal(made.values, ramp("i8") + 2 ** 40)
-    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
-        for dim, size in zip("zyx", (4, 5, 6)):
-            file.createDimension(dim, size)
+    with netcdf_file(tmp_path / "a.nc") as file:
         file.createVariable("ids", "u8", ("z", "y", "x"), fill_value=2 ** 64 - 1)[:] = np.ma.MaskedArray(ramp("u8"), ramp() == 1)
     made = convert(tmp_path / "a.nc")
     assert made.grid.value_type == "int64" and made.missing == 1 and made.values[0, 0, 1] == 2

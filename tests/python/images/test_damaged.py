@@ -22,7 +22,7 @@ import pytest
 import esvr
 from esvr.images import image, image2vdb, program
 
-from conversions import dicom, ramp, run_here
+from conversions import dicom, metaimage, mrc, netcdf_file, nifti, nrrd, ramp, run_here, tiff
 
 
 # Loaded before processes are forked, so that not each of them loads them.
@@ -32,54 +32,22 @@ for module in ("nibabel", "mrcfile", "tifffile", "h5py", "netCDF4", "pydicom", "
         importlib.import_module(module)
 
 
-def make_nifti(path):
-    pytest.importorskip("nibabel").save(pytest.importorskip("nibabel").Nifti1Image(ramp("i2"), np.eye(4)), path)
-
-
-def make_nrrd(path):
-    path.write_bytes(b"NRRD0004\ntype: ushort\ndimension: 3\nsizes: 6 5 4\nendian: little\nencoding: raw\n\n" + ramp().tobytes())
-
-
-def make_gzip_nrrd(path):
+def gzip_nrrd(path):
     path.write_bytes(b"NRRD0004\ntype: ushort\ndimension: 3\nsizes: 6 5 4\nendian: little\nencoding: gzip\n\n" + zlib.compress(
         np.random.default_rng(1).integers(0, 60000, 120).astype("u2").tobytes()))
 
 
-def make_meta(path):
-    path.write_bytes(b"NDims = 3\nDimSize = 6 5 4\nElementType = MET_USHORT\nElementDataFile = LOCAL\n" + ramp().tobytes())
-
-
-def make_mrc(path):
-    with pytest.importorskip("mrcfile").new(path) as file:
-        file.set_data(ramp("i2"))
-
-
-def make_tiff(path):
-    pytest.importorskip("tifffile").imwrite(path, ramp(), photometric="minisblack", metadata={"axes": "ZYX"})
-
-
-def make_ome(path):
-    pytest.importorskip("tifffile").imwrite(path, ramp(), ome=True, photometric="minisblack", compression="zlib",
-                                            metadata={"axes": "ZYX"})
-
-
-def make_hdf5(path):
+def hdf5(path):
     with pytest.importorskip("h5py").File(path, "w") as file:
         file.create_dataset("a", data=ramp(), chunks=(2, 5, 6), compression="gzip")
 
 
-def make_netcdf(path, form="NETCDF4"):
-    with pytest.importorskip("netCDF4").Dataset(path, "w", format=form) as file:
-        for dim, size in zip("zyx", (4, 5, 6)):
-            file.createDimension(dim, size)
+def netcdf(path, form="NETCDF4"):
+    with netcdf_file(path, form=form) as file:
         file.createVariable("t", "f4", ("z", "y", "x"))[:] = ramp()
 
 
-def make_classic(path):
-    make_netcdf(path, "NETCDF3_CLASSIC")
-
-
-def make_vti(path):
+def vti(path):
     pytest.importorskip("vtkmodules.vtkIOXML")
     path.write_bytes(b'<VTKFile type="ImageData" version="1.0" byte_order="LittleEndian" header_type="UInt32"><ImageData '
                      b'WholeExtent="0 5 0 4 0 3" Origin="0 0 0" Spacing="1 1 1"><Piece Extent="0 5 0 4 0 3"><PointData><DataArray '
@@ -87,17 +55,13 @@ def make_vti(path):
                      b'encoding="raw">_' + (240).to_bytes(4, "little") + ramp().tobytes() + b"</AppendedData></VTKFile>")
 
 
-def make_npy(path):
-    np.save(path, ramp())
-
-
-def make_dicom(path):
-    shutil.copy(dicom(path.parent / "series", ramp()[:1]) / "s0.dcm", path)
-
-
-FILES = {"a.nii": make_nifti, "a.nii.gz": make_nifti, "a.nrrd": make_nrrd, "b.nrrd": make_gzip_nrrd, "a.mha": make_meta,
-         "a.mrc": make_mrc, "a.tif": make_tiff, "a.ome.tif": make_ome, "a.h5": make_hdf5, "a.nc": make_netcdf, "b.nc": make_classic,
-         "a.vti": make_vti, "a.npy": make_npy, "a.dcm": make_dicom}
+FILES = {"a.nii": lambda path: nifti(path, ramp("i2")), "a.nii.gz": lambda path: nifti(path, ramp("i2")),
+         "a.nrrd": lambda path: nrrd(path, [("dimension", 3), ("sizes", "6 5 4")], ramp()), "b.nrrd": gzip_nrrd,
+         "a.mha": lambda path: metaimage(path, {"NDims": 3, "DimSize": "6 5 4", "ElementType": "MET_USHORT"}, ramp().tobytes()),
+         "a.mrc": lambda path: mrc(path, ramp("i2")), "a.tif": lambda path: tiff(path, ramp(), metadata={"axes": "ZYX"}),
+         "a.ome.tif": lambda path: tiff(path, ramp(), ome=True, compression="zlib", metadata={"axes": "ZYX"}), "a.h5": hdf5,
+         "a.nc": netcdf, "b.nc": lambda path: netcdf(path, "NETCDF3_CLASSIC"), "a.vti": vti, "a.npy": lambda path: np.save(path, ramp()),
+         "a.dcm": lambda path: shutil.copy(dicom(path.parent / "series", ramp()[:1]) / "s0.dcm", path)}
 
 
 def checked(path, out, code, said):
@@ -206,7 +170,7 @@ def test_promises_are_checked_before_memory_is_taken(tmp_path, capfd, name):
         np.save(path, ramp())
         path.write_bytes(path.read_bytes().replace(b"(4, 5, 6), }        ", b"(4000, 5000, 6000), }"[:20].ljust(20)))
     elif name.endswith(".mrc"):
-        make_mrc(path)
+        mrc(path, ramp("i2"))
         data = bytearray(path.read_bytes())
         at = 0 if name == "a.mrc" else 92  # the sizes, or the length of a second header
         data[at:at + 12] = np.array([2000, 2000, 2000] if name == "a.mrc" else [2 ** 31 - 1, 0, 0], "<i4").tobytes()
@@ -237,7 +201,7 @@ def test_packed_and_detached_data(tmp_path, capfd, name, content):
 def test_no_place_for_temporary_files(tmp_path, capfd, monkeypatch):
     def full():
         raise OSError(errno.ENOSPC, "No space left on device")
-    make_gzip_nrrd(tmp_path / "a.nrrd")
+    gzip_nrrd(tmp_path / "a.nrrd")
     monkeypatch.setattr(image, "tempfile", types.SimpleNamespace(TemporaryFile=full))
     assert run_here(image2vdb, tmp_path / "a.nrrd", tmp_path / "o.vdb") == 1  # the image is not damaged
     assert "TMPDIR names another folder" in capfd.readouterr().err
@@ -245,7 +209,7 @@ def test_no_place_for_temporary_files(tmp_path, capfd, monkeypatch):
 
 def test_damaged_descriptions_and_slices(tmp_path, capfd):
     text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><Image'
-    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
+    tiff(tmp_path / "a.ome.tif", ramp(), description=text)
     assert attempt(tmp_path / "a.ome.tif", capfd) == 3
     folder = dicom(tmp_path / "series", ramp(), tool=("dcmcrle",))
     cut = folder / "s2.dcm"
@@ -312,8 +276,7 @@ def test_outputs_are_replaced_only_by_force(tmp_path, capfd):
 
 
 def test_a_missing_reader_is_named(tmp_path, capfd, monkeypatch):
-    make_nrrd(tmp_path / "a.nrrd")
-    make_mrc(tmp_path / "a.mrc")
+    mrc(tmp_path / "a.mrc", ramp("i2"))
     monkeypatch.setitem(sys.modules, "mrcfile", None)
     assert run_here(image2vdb, tmp_path / "a.mrc", tmp_path / "o.vdb") == 1
     assert "install the package python3-mrcfile" in capfd.readouterr().err

@@ -13,7 +13,8 @@ import esvr
 from esvr.images import image2vdb, vdb2image
 from esvr.images.image import LPS_TO_RAS
 
-from conversions import convert, convert_all, dicom, ramp, run_here, tilted, vtk_image
+from conversions import convert, convert_all, dicom, geotiff, mrc, ramp, run_here, tiff, tilted, vtk_image
+
 
 def same(made, values, matrix=None, atol=1e-5):
     assert made.values.shape == values.shape
@@ -155,24 +156,17 @@ def test_metaimage_by_hand_as_itk_reads_it(tmp_path):
 # -- MRC by mrcfile ----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["i1", "i2", "u2", "f4", "f2"])
 @pytest.mark.parametrize("compression", [None, "gzip"])
-def test_mrc_by_mrcfile(tmp_path, kind, compression, mrcfile):
+def test_mrc_by_mrcfile(tmp_path, kind, compression):
     values = (ramp() % 100 - 50).astype(kind) if kind == "i1" else ramp(kind)
-    with mrcfile.new(tmp_path / "a.mrc", compression=compression) as file:
-        file.set_data(values)
-        file.voxel_size = (1.5, 2.5, 4.0)
-        file.header.origin = (10, 20, 30)
+    mrc(tmp_path / "a.mrc", values, compression=compression, voxel_size=(1.5, 2.5, 4.0), origin=(10, 20, 30))
     made = convert(tmp_path / "a.mrc", "--unit", "angstrom")
     same(made, values, [[1.5, 0, 0, 10], [0, 2.5, 0, 20], [0, 0, 4, 30], [0, 0, 0, 1]])
     assert made.unit == "angstrom"
 
 
-def test_mrc_axes_and_starts_by_mrcfile(tmp_path, mrcfile):
-    with mrcfile.new(tmp_path / "a.map") as file:
-        file.set_data(ramp("f4"))
-        file.header.mapc, file.header.mapr, file.header.maps = 3, 2, 1
-        file.header.mx, file.header.my, file.header.mz = 4, 5, 6
-        file.header.cella = (4 * 2.0, 5 * 0.75, 6 * 0.5)
-        file.header.nxstart, file.header.nystart, file.header.nzstart = 5, 6, 7
+def test_mrc_axes_and_starts_by_mrcfile(tmp_path):
+    mrc(tmp_path / "a.map", ramp("f4"), mapc=3, mapr=2, maps=1, mx=4, my=5, mz=6, cella=(4 * 2.0, 5 * 0.75, 6 * 0.5), nxstart=5,
+        nystart=6, nzstart=7)
     made = convert(tmp_path / "a.map", "--unit", "angstrom")
     assert np.array_equal(made.values, ramp().transpose(2, 1, 0))
     assert np.allclose(made.spacing, [2, 0.75, 0.5])
@@ -252,7 +246,7 @@ def test_ome_by_tifffile(tmp_path, axes, tifffile):
 
 def test_volumes_in_tiles_by_tifffile(tmp_path):
     values = ramp("u2", (40, 35, 20))
-    pytest.importorskip("tifffile").imwrite(tmp_path / "a.tif", values, tile=(16, 16, 16), photometric="minisblack")
+    tiff(tmp_path / "a.tif", values, tile=(16, 16, 16))
     same(convert(tmp_path / "a.tif"), values)
 
 
@@ -298,20 +292,17 @@ def test_ome_in_two_files_by_tifffile(tmp_path, tifffile):
 def test_codes_by_gdal(tmp_path, options, gdal):
     pytest.importorskip("tifffile")
     values = ramp("u2")[0:1] % 1000
-    data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16, options)
-    data.GetRasterBand(1).WriteArray(values[0])
-    data = None
+    geotiff(tmp_path / "a.tif", values, *options)
     same(convert(tmp_path / "a.tif"), gdal.Open(str(tmp_path / "a.tif")).ReadAsArray()[np.newaxis])
     same(convert(tmp_path / "a.tif"), values)
 
 
-def test_float_predictor_missing_and_scale_by_gdal(tmp_path, gdal):
+def test_float_predictor_missing_and_scale_by_gdal(tmp_path):
     pytest.importorskip("tifffile")
     values = ramp("f4")[0] / 4
     values[0, 0] = -9999
-    data = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_Float32, ["COMPRESS=LZW", "PREDICTOR=3"])
+    data = geotiff(tmp_path / "a.tif", values[np.newaxis], "COMPRESS=LZW", "PREDICTOR=3")
     band = data.GetRasterBand(1)
-    band.WriteArray(values)
     band.SetNoDataValue(-9999)
     band.SetScale(2.0)
     band.SetOffset(10.0)
@@ -619,10 +610,7 @@ def test_palettes_of_dicom_by_pydicom(tmp_path):
 def test_masks_of_tiff_by_gdal(tmp_path, gdal):
     gdal.UseExceptions()
     gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", "YES")
-    file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 5, 1, gdal.GDT_UInt16)
-    file.GetRasterBand(1).WriteArray(ramp()[0])
-    file.CreateMaskBand(gdal.GMF_PER_DATASET)
-    file = None
+    geotiff(tmp_path / "a.tif", ramp()[:1]).CreateMaskBand(gdal.GMF_PER_DATASET)
     gdal.SetConfigOption("GDAL_TIFF_INTERNAL_MASK", None)
     made = convert(tmp_path / "a.tif")
     same(made, ramp()[:1])
@@ -631,7 +619,7 @@ def test_masks_of_tiff_by_gdal(tmp_path, gdal):
 
 def test_ome_whose_description_is_elsewhere(tmp_path):
     text = '<?xml version="1.0"?><OME xmlns="http://www.openmicroscopy.org/Schemas/OME/2016-06"><BinaryOnly MetadataFile="a.ome" UUID="u"/></OME>'
-    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", ramp(), description=text, metadata=None, photometric="minisblack")
+    tiff(tmp_path / "a.ome.tif", ramp(), description=text)
     with pytest.raises(esvr.BadInput, match="OME-XML in another file"):
         convert(tmp_path / "a.ome.tif")
 
@@ -643,10 +631,6 @@ def test_colors_from_below_by_tifffile(tmp_path, planar, tifffile):
     same(convert(tmp_path / "a.tif", "--channel", 2), ramp()[:1, ::-1] + 2000)
 
 
-def test_as_many_rows_as_colors_by_gdal(tmp_path, gdal):
-    gdal.UseExceptions()
-    file = gdal.GetDriverByName("GTiff").Create(str(tmp_path / "a.tif"), 6, 3, 3, gdal.GDT_UInt16, ["COMPRESS=LZW", "INTERLEAVE=PIXEL"])
-    for k in range(3):
-        file.GetRasterBand(k + 1).WriteArray(ramp()[k, :3])
-    file = None
+def test_as_many_rows_as_colors_by_gdal(tmp_path):
+    geotiff(tmp_path / "a.tif", ramp()[:3, :3], "COMPRESS=LZW", "INTERLEAVE=PIXEL")
     same(convert(tmp_path / "a.tif", "--channel", 1), ramp()[1:2, :3])

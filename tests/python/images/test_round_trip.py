@@ -11,7 +11,7 @@ import esvr
 from esvr.images import image2vdb, vdb2image
 from esvr.images.image import LPS_TO_RAS
 
-from conversions import convert, dicom, ramp, run_here, tilted, vtk_image
+from conversions import convert, dicom, metaimage, mrc, netcdf_file, ramp, run_here, tiff, tilted, vtk_image
 
 BOX = np.diag([0.5, 0.75, 2.0, 1.0])
 
@@ -125,17 +125,13 @@ def write_meta(path, values):
     matrix = LPS_TO_RAS @ tilted()
     spacing = np.linalg.norm(matrix[:3, :3], axis=0)
     kind = {"uint16": "USHORT", "float32": "FLOAT", "int64": "LONG_LONG", "int16": "SHORT"}[values.dtype.name]
-    lines = ["NDims = 3", "DimSize = 6 5 4", f"TransformMatrix = {' '.join(map(repr, (matrix[:3, :3] / spacing).T.ravel()))}",
-             f"Offset = {' '.join(map(repr, matrix[:3, 3]))}", f"ElementSpacing = {' '.join(map(repr, spacing))}",
-             f"ElementType = MET_{kind}", "ElementDataFile = LOCAL", ""]
-    path.write_bytes("\n".join(lines).encode() + values.tobytes())
+    vectors = {"TransformMatrix": (matrix[:3, :3] / spacing).T.ravel(), "Offset": matrix[:3, 3], "ElementSpacing": spacing}
+    metaimage(path, {"NDims": 3, "DimSize": "6 5 4", **{key: " ".join(map(repr, vector)) for key, vector in vectors.items()},
+                     "ElementType": f"MET_{kind}"}, values.tobytes())
 
 
 def write_mrc(path, values):
-    with pytest.importorskip("mrcfile").new(path) as file:
-        file.set_data(values)
-        file.voxel_size = (1.5, 2.5, 4.0)
-        file.header.origin = (10, 20, 30)
+    mrc(path, values, voxel_size=(1.5, 2.5, 4.0), origin=(10, 20, 30))
 
 
 def write_imagej(path, values):
@@ -150,9 +146,8 @@ def write_ome(path, values):
 
 
 def write_netcdf(path, values):
-    with pytest.importorskip("netCDF4").Dataset(path, "w") as file:
+    with netcdf_file(path) as file:
         for dim, size, step in zip("zyx", (4, 5, 6), (2.0, -0.75, 0.5)):
-            file.createDimension(dim, size)
             axis = file.createVariable(dim, "f8", (dim,))
             axis.units = "km"
             axis[:] = 7 + step * np.arange(size)
@@ -245,9 +240,7 @@ def test_missing_voxels_come_back(tmp_path, ending):
 
 
 def test_integers_with_holes_come_back_as_netcdf(tmp_path, netcdf):
-    with netcdf.Dataset(tmp_path / "a.nc", "w") as file:
-        for dim, size in zip("zyx", (4, 5, 6)):
-            file.createDimension(dim, size)
+    with netcdf_file(tmp_path / "a.nc") as file:
         file.createVariable("t", "i8", ("z", "y", "x"), fill_value=-1)[:] = np.ma.MaskedArray(ramp("i8") + 2 ** 60, ramp() == 5)
     assert run_here(image2vdb, tmp_path / "a.nc", tmp_path / "a.vdb") == 0
     assert run_here(vdb2image, tmp_path / "a.vdb", tmp_path / "b.nc") == 0
@@ -296,8 +289,8 @@ def test_what_a_format_cannot_hold(tmp_path, capfd):
 
 
 def test_grids_are_chosen_and_boxes_follow_voxels(tmp_path, capfd):
-    pytest.importorskip("tifffile").imwrite(tmp_path / "a.ome.tif", np.stack([ramp(), ramp() + 1000]), ome=True, metadata={
-        "axes": "CZYX", "Channel": {"Name": ["DAPI", "GFP"]}}, photometric="minisblack")
+    tiff(tmp_path / "a.ome.tif", np.stack([ramp(), ramp() + 1000]), ome=True, metadata={
+        "axes": "CZYX", "Channel": {"Name": ["DAPI", "GFP"]}})
     assert run_here(image2vdb, tmp_path / "a.ome.tif", tmp_path / "a.vdb", "--channel", "all") == 0
     assert run_here(vdb2image, tmp_path / "a.vdb", tmp_path / "b.npy") == 2
     assert run_here(vdb2image, tmp_path / "a.vdb", tmp_path / "b.npy", "-g", "GFP", "--type", "float32") == 0

@@ -185,13 +185,16 @@ Request requestTo(const std::string& host, const std::string& target = "/0123456
 }
 
 TEST(RequestRules, GiveThePageUnderEveryOwnName) {
-  for (const char* host : {"localhost", "127.0.0.1:80", "[::1]:80", "[::1]", "192.168.1.7:80",
-                           "render-07", "render-07:8080"})
+  for (const char* host : {"localhost", "localhost:8080", "127.0.0.1", "127.0.0.1:80", "[::1]:80",
+                           "[::1]", "192.168.1.7:80", "render-07", "render-07:8080"})
     EXPECT_EQ(judge(requestTo(host), kSite).target, Target::kPage) << host;
 }
 
+// A page of another site may have a name that its owner lets point to this machine.
 TEST(RequestRules, RefuseOtherNames) {
-  for (const char* host : {"render-08", "render-07.example", "::1]", "[::1", ""}) {
+  for (const char* host :
+       {"render-08", "render-07.example", "::1]", "[::1", "", "evil.example", "evil.example:80",
+        "localhost.evil.example", "127.0.0.1.evil.example", "127.0.0.1evil"}) {
     const Verdict verdict = judge(requestTo(host), kSite);
     EXPECT_EQ(verdict.target, Target::kNothing) << host;
     EXPECT_EQ(verdict.status, http::status::forbidden) << host;
@@ -202,7 +205,8 @@ TEST(RequestRules, TakeTheOriginOfTheHostOnly) {
   Request request = requestTo("render-07:80");
   request.set(http::field::origin, "http://render-07:80");
   EXPECT_EQ(judge(request, kSite).target, Target::kPage);
-  for (const char* origin : {"http://render-07", "https://render-07:80", "http://localhost:80"}) {
+  for (const char* origin : {"http://render-07", "https://render-07:80", "http://localhost:80",
+                             "http://evil.example", "null", ""}) {
     request.set(http::field::origin, origin);
     EXPECT_EQ(judge(request, kSite).status, http::status::forbidden) << origin;
   }
