@@ -334,6 +334,26 @@ void setSigns(const SparseVolume& volume, Tree& tree) {
   if (EmptySigns(volume).agree()) openvdb::tools::signedFloodFill(tree, true, 1, kFirstOfTiles);
 }
 
+/// Replaces leaves whose voxels are all active and equal by tiles, and these by larger ones. OpenVDB's prune() takes a NaN
+/// to be equal to any number, so that one in a leaf of equal voxels is lost, or becomes all of them.
+template <class Tree>
+void mergeEqualVoxels(Tree& tree) {
+  using Leaf = typename Tree::LeafNodeType;
+  std::vector<const Leaf*> equal;
+  for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+    const auto* const values = leaf->buffer().data();
+    const bool isEqual = leaf->isDense() && std::all_of(values + 1, values + Leaf::SIZE,
+                                                        [&](auto v) { return v == *values; });
+    if (isEqual) equal.push_back(&*leaf);
+  }
+  constexpr openvdb::Index kTileOfABrick = 1;  // level in the tree
+  for (const Leaf* leaf : equal) {
+    const auto value = leaf->buffer()[0];
+    tree.addTile(kTileOfABrick, openvdb::Coord(leaf->origin()), value, true);
+  }
+  openvdb::tools::pruneTiles(tree);
+}
+
 template <class Tree>
 GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, LeafVoxels voxels) {
   const auto background = typename Tree::ValueType(source.descriptor.background);
@@ -352,7 +372,7 @@ GridBase::Ptr makeGrid(const VolumeGrid& source, const WriteOptions& options, Le
   if (levelSet && background > 0) setSigns(volume, tree);
   if (isSigned) setNonFinite(source.volume, tree);
   if (options.constantTiles) {
-    openvdb::tools::prune(tree);
+    mergeEqualVoxels(tree);
     keepLeaves(NumberVoxels{volume}, tree);
   }
   return grid;

@@ -88,6 +88,27 @@ TEST_F(Write, ConstantLeavesBecomeTilesUnlessToldOtherwise) {
   EXPECT_EQ(leaves->tree().leafCount(), 2u);
 }
 
+/// The prune() of OpenVDB takes a NaN to be equal to any number (findings/openvdb-nan-equals-any-number.sh).
+TEST_F(Write, ANanDoesNotMakeABrickConstant) {
+  std::vector<test::Voxel> voxels = fullBrick({0, 0, 0}, 5.0f);
+  voxels[292].value = kNan;
+  for (int i = 0; i < kBrickVoxels; ++i)
+    voxels.push_back({Coord{8, 0, 0} + voxelLocal(i), i > 0 ? float(i) : kNan});
+  const auto equal = fullBrick({16, 0, 0}, 0.75f), none = fullBrick({24, 0, 0}, kNan);
+  voxels.insert(voxels.end(), equal.begin(), equal.end());
+  voxels.insert(voxels.end(), none.begin(), none.end());
+  for (const GridClass gridClass : {GridClass::kFogVolume, GridClass::kLevelSet})
+    for (const char* name : {"out.vdb", "out.nvdb"}) {
+      SCOPED_TRACE(name);
+      auto grid = test::gridOf("density", voxels, 1000.0f);
+      grid.descriptor.gridClass = gridClass;
+      write(grid, {.overwrite = true}, name);
+      const auto back =
+          readGrid(directory_ / name, "density", {.nonFinite = NonFinite::kKeep}).volume;
+      EXPECT_EQ(test::volumeDifference(back, grid.volume), "");
+    }
+}
+
 // Blender draws nothing of a grid without a leaf.
 TEST_F(Write, LeavesRemainWhereAllVoxelsWouldBeInTiles) {
   auto voxels = fullBrick({8, 16, -8}, 0.75f);
