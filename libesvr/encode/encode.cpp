@@ -748,12 +748,13 @@ std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput
       options.fit.narrowBand ? convertNarrowBand(job, convertToGoal) : convert(job);
   if (!made) return std::nullopt;
   made->smallerExactBytes = unlessCancelled([&] { return smallerExactBytes(job, made->grid); });
-  if (tone.isOn()) setTone(given, tone, made->grid);
-  if (judge) {
+  {
     const BestSoFar completion;  // a grid that is there is not given up
-    made->grid.layerErrors = made->fit.end == FitEnd::kCancelled
-                                 ? std::vector<LayerError>{}
-                                 : layerErrorsOf(made->grid, given.source, judge->comparison());
+    if (tone.isOn()) setTone(given, tone, made->grid);
+    if (judge)
+      made->grid.layerErrors = made->fit.end == FitEnd::kCancelled
+                                   ? std::vector<LayerError>{}
+                                   : layerErrorsOf(made->grid, given.source, judge->comparison());
   }
   made->byPictures = seesPictures(job);
   if (std::holds_alternative<SizeGoal>(options.goal)) made->more = moreThanPreset(job, *made);

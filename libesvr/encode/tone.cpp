@@ -203,13 +203,30 @@ double Judge::massFactor(double wanted, const SparseVolume& decoded) const {
   return factor;
 }
 
+namespace {
+
+/// While it lives, the decoded values of a grid are not clamped to the range of the source.
+struct Unclamped {
+  explicit Unclamped(StoredGrid& given) : grid(given), before(given.withinRange) {
+    grid.withinRange = false;
+  }
+  ~Unclamped() { grid.withinRange = before; }
+  Unclamped(const Unclamped&) = delete;
+  Unclamped& operator=(const Unclamped&) = delete;
+
+  StoredGrid& grid;
+  bool before;
+};
+
+}  // namespace
+
 double keepMass(const Job& job, StoredGrid& grid) {
   const auto decoded = [&] { return decodeGrid(grid, {.memory = memoryOf(job.input.source)}); };
   if (!seesPictures(job) || grid.quantised.empty()) return psnrOf(job, decoded());
-  // Sums that are not clamped yet grow with the factor.
-  const bool isClamped = std::exchange(grid.withinRange, false);
-  SparseVolume sums = decoded();
-  grid.withinRange = isClamped;
+  SparseVolume sums = [&] {
+    const Unclamped sumsGrowWithTheFactor(grid);
+    return decoded();
+  }();
   const double factor = job.judge->massFactor(job.judge->mass(), sums);
   for (std::size_t c = 0; c < grid.quantised.size(); ++c) {
     grid.quantised[c].lattice.intensityStep *= factor;
