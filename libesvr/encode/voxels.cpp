@@ -196,10 +196,12 @@ constexpr double kPsnrTolerance = 0.05, kFinalTolerance = 0.08;
 constexpr double kFineLevels = 4.0;
 /// Share of a size that may stay unused.
 constexpr double kSizeTolerance = 0.01;
+/// Share of a size above which no jump of the bytes keeps voxels from using all of it.
+constexpr double kShareOfJump = 0.97;
 /// Factor by which codes may exceed a size before a trial ends. While codes are chosen, the coder's
 /// parameters are those of the nearest codes, which can take a few more bytes.
 constexpr double kCodesBeyondSize = 1.1;
-/// Where the bound cannot be chosen freely, higher prices use up the PSNR that is left.
+/// Where the bound cannot be chosen freely, higher prices use up the PSNR or the bytes that are left.
 constexpr std::array kPlateauPrices{0.08, 0.12, 0.2, 0.3};
 
 RootRange octaves() { return {kCoarsest, kFinest, kNarrowest}; }
@@ -479,24 +481,42 @@ std::optional<VoxelSearch::Tried> VoxelSearch::sized(const SparseVolume& volume,
   return made;
 }
 
-/// The best voxels found that keep to the size. With plateaus, the largest are not always the best.
+/// The best voxels found that keep to the size. With plateaus, the largest are not always the best. Where the values are
+/// integers, the bytes jump with the bound; voxels beyond the jump may keep to the size at a higher price.
 std::optional<VoxelSearch::Tried> VoxelSearch::fullest(const SparseVolume& volume,
                                                        const Setting& first) const {
   const double bytes = double(*goal_.bytes);
   RootSearch search(octaves(), std::log2((1.0 - 0.3 * kSizeTolerance) * bytes), kDoublingsPerOctave,
                     first.octave);
   std::optional<Tried> best;
-  for (int n = 0; n < kSizeTrials && !search.ended(); ++n) {
+  std::optional<Setting> beyond;  // the coarsest setting that is too large
+  bool isFull = false;
+  const auto isLarge = [&](const Tried& trial, double share) {
+    return double(trial.bytes) >= share * bytes;
+  };
+  for (int n = 0; n < kSizeTrials && !search.ended() && !isFull; ++n) {
     Setting setting{search.next(), first.price};
     if (first.levels > 0.0) setting.levels = levelsOf(setting);
     auto now = unlessCancelled([&] { return sized(volume, setting); });
-    if (!now && best) break;
+    if (!now && best) return best;
     if (!now) throw Cancelled();
     search.learn(std::log2(double(now->bytes)));
-    if (double(now->bytes) > bytes) continue;
-    const bool isFull = double(now->bytes) >= (1.0 - kSizeTolerance) * bytes;
+    if (double(now->bytes) > bytes) {
+      if (!beyond || setting.octave < beyond->octave) beyond = setting;
+      continue;
+    }
+    isFull = isLarge(*now, 1.0 - kSizeTolerance);
     if (!best || now->psnr > best->psnr) best = std::move(now);
-    if (isFull) break;
+  }
+  const bool isJump = beyond && (!best || !isLarge(*best, kShareOfJump));
+  for (const double price : kPlateauPrices) {
+    if (!isJump || price <= first.price) continue;
+    beyond->price = price;
+    auto now = unlessCancelled([&] { return sized(volume, *beyond); });
+    if (!now) break;
+    if (double(now->bytes) > bytes) continue;
+    if (!best || now->psnr > best->psnr) best = std::move(now);
+    break;
   }
   return best;
 }
