@@ -24,6 +24,7 @@
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
+#include "format/section_table.h"
 #include "format/voxel_sections.h"
 
 namespace esvr::encode {
@@ -740,7 +741,7 @@ std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput
       options.previous = &before;
     }
     if (auto* size = std::get_if<SizeGoal>(&options.goal))
-      size->bytes -= std::min<std::uint64_t>(size->bytes, sizeof tone.scale);
+      size->bytes -= std::min<std::uint64_t>(size->bytes, format::kAlignment);  // the scale, padded
   }
   const ConvertInput input{descriptor, tone.isOn() ? tones : given.source};
   const Job job{input, options, judge ? &*judge : nullptr, choice.scout};
