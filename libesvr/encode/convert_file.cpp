@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cmath>
 #include <future>
+#include <limits>
 #include <map>
 #include <string>
 #include <utility>
@@ -290,6 +291,7 @@ GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source,
   ConvertOptions options = options_.convert;
   options.fit = fit;
   options.goal = resolvedGoal(g, source);
+  if (!asVoxels_.empty() && asVoxels_[g]) options.representation = Representation::kVoxels;
   options.previous = expected ? expected : previous;
   if (before) options.previousCompact = before->compact;
   if (expected) options.keepsPastErrors = false;  // those of another grid are not worth it
@@ -585,7 +587,8 @@ class SizeSearch {
         options_(options),
         converter_(converter),
         twins_(twins),
-        seconds_(source.grids.size()) {}
+        seconds_(source.grids.size()),
+        betterAsVoxels_(source.grids.size(), std::numeric_limits<double>::infinity()) {}
 
   ConvertedFile run() {
     const double size = double(*options_.size), first = options_.previous.quality;
@@ -636,16 +639,26 @@ class SizeSearch {
   /// Converts the file with a quality, and keeps it if it is the best one that keeps to the size.
   /// \return its bytes
   std::uint64_t tryQuality(double more) {
-    converter_.tryGoal(PresetGoal{more});
+    std::vector<bool> asVoxels(betterAsVoxels_.size());
+    for (std::size_t g = 0; g < asVoxels.size(); ++g) asVoxels[g] = more >= betterAsVoxels_[g];
+    converter_.tryGoal(PresetGoal{more}, std::move(asVoxels));
     ConvertedFile made = convertOnce(source_, options_, converter_, twins_);
     const std::uint64_t bytes = bytesOf(made.file);
     fewest_ = std::min(fewest_.value_or(bytes), bytes);
-    for (const GridConversion& grid : made.grids) seconds_[grid.source] += grid.secondsConvert;
+    for (const GridConversion& grid : made.grids) learnFrom(grid, more);
     const bool isWorse = best_ && (made.interrupted || best_->quality >= more);
     if (bytes > *options_.size || isWorse) return bytes;
     made.quality = more;
     best_ = std::move(made);
     return bytes;
+  }
+
+  /// Where voxels are better than ellipsoids, they are at any higher quality.
+  void learnFrom(const GridConversion& grid, double more) {
+    seconds_[grid.source] += grid.secondsConvert;
+    const auto& choice = grid.conversion.choice;
+    if (grid.conversion.grid.voxels && choice && choice->ellipsoids)
+      betterAsVoxels_[grid.source] = std::min(betterAsVoxels_[grid.source], more);
   }
 
   [[nodiscard]] std::uint64_t bytesOf(const EsvrFile& file) const {
@@ -660,7 +673,8 @@ class SizeSearch {
   const Twins& twins_;
   std::optional<ConvertedFile> best_;
   std::optional<std::uint64_t> fewest_;
-  std::vector<double> seconds_;  ///< that all conversions of each grid took
+  std::vector<double> seconds_;         ///< that all conversions of each grid took
+  std::vector<double> betterAsVoxels_;  ///< from which quality on, by grids
 };
 
 /// Converts the grids to a file of at most a size.

@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "esvr/convert_file.h"
@@ -31,8 +32,11 @@ class GridConverter {
   [[nodiscard]] const Goal& goalOf(std::size_t g) const;
   /// Replaces the goals of all grids.
   void setGoal(const Goal& goal) { goal_ = goal; }
-  /// The same for a trial, of which FileOptions::onConverted is not told.
-  void tryGoal(const Goal& goal) { goal_ = goal, isTrial_ = true; }
+  /// The same for a trial, of which FileOptions::onConverted is not told. \param asVoxels  true for grids of which only
+  /// voxels are considered
+  void tryGoal(const Goal& goal, std::vector<bool> asVoxels) {
+    goal_ = goal, isTrial_ = true, asVoxels_ = std::move(asVoxels);
+  }
   /// Tells FileOptions::onConverted of a conversion, unless it is a trial.
   void tell(const VolumeGrid& source, const GridConversion& made) const;
   /// Reads the grids of a trial that is the result, and tells of all of them.
@@ -75,6 +79,7 @@ class GridConverter {
   FitOptions fit_;            ///< options of the fits; their device may change
   std::optional<Goal> goal_;  ///< instead of those of all grids
   bool isTrial_ = false;
+  std::vector<bool> asVoxels_;
   std::vector<VectorScale> scales_;
   std::vector<ActiveSet> sets_;  ///< the active voxels of the vectors of the file
 };
