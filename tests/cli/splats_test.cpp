@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "cli/conversion.h"
 #include "esvr/splats.h"
@@ -119,6 +120,27 @@ TEST_F(SplatFiles, AreNamedByTheErrorsOfTheirGrids) {
     EXPECT_THAT(vdb2esvr(joined({at("out.ply"), at("out.esvr")}, more)),
                 Fails(code, at("out.ply"), why));
   }
+}
+
+TEST_F(SplatFiles, HaveTheSizeOfTheirFileInRatiosAndReports) {
+  succeeded(exportTo("out.ply"));
+  const std::string bytes = std::to_string(sizeOf("out.ply"));
+  const std::string options = " --voxel-size 1 --preset draft --force --report " + at("r.json");
+  const auto expectSize = [&](const ProgramRun& run) {
+    EXPECT_THAT(succeeded(run).out, HasSubstr(" " + bytes + " bytes -> "));
+    const auto report = nlohmann::json::parse(readText(at("r.json")));
+    EXPECT_EQ(report["input"]["format"], "PLY");
+    EXPECT_EQ(report["input"]["bytes"], sizeOf("out.ply"));
+    EXPECT_EQ(report["input"]["bytes_converted"], sizeOf("out.ply"));
+    EXPECT_EQ(report["ratio"], double(sizeOf("out.ply")) / double(sizeOf("out.esvr")));
+  };
+  const std::string command = std::string(VDB2ESVR) + " ";
+  expectSize(runShell(command + at("out.ply") + " " + at("out.esvr") + options));
+  expectSize(runShell(command + at("out.ply") + " " + at("out.esvr") + options + " --skip Cd"));
+  expectSize(runShell(command + "- " + at("out.esvr") + options + " < " + at("out.ply")));
+  succeeded(vdb2esvr({at("out.ply"), at("out.esvr"), "--voxel-size", "1", "--force", "--skip", "Cd",
+                      "--ratio", "2"}));
+  EXPECT_LE(2 * sizeOf("out.esvr"), sizeOf("out.ply"));
 }
 
 TEST_F(SplatFiles, AreTakenFromAPipe) {
