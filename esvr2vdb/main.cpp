@@ -122,11 +122,11 @@ cli::CommandLine commandLine() {
      "the world)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
-  cli::addSplatInput(line.options(),
-                     "side of a voxel in units of the world: of a grid made of splats (default: "
-                     "1/256 of the longest side of the splats' box), or of grids of IN.esvr, which "
-                     "are averaged or, if they are ellipsoids, evaluated between the voxels "
-                     "(default: as in the source)");
+  cli::addSplatInput(
+      line.options(),
+      "side of a voxel in units of the world: of a grid made of splats (default: as in their grid, "
+      "or 1/256 of their box), or of grids of IN.esvr, which are averaged or, if they are "
+      "ellipsoids, evaluated between the voxels (default: as in the source)");
   cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
   line.mainOptions({"list", "check", "grid", "lod", "bbox", "coarsen", "reference", "colors",
