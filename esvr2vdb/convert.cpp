@@ -603,6 +603,9 @@ StoredGrid partOf(StoredGrid grid, const Options& options) {
   if (options.part.layers) grid = firstLayers(std::move(grid), *options.part.layers);
   if (options.maxEllipsoids) grid = heaviest(std::move(grid), *options.maxEllipsoids);
   if (options.part.box) grid.activeBox = common(grid.activeBox, *options.part.box);
+  if (options.part.box && (grid.activeBox.empty() || grid.field.ellipsoidCount() == 0))
+    throw CannotConvert("grid \"" + shownName(grid.descriptor.name) +
+                        "\" has nothing in the box of --bbox, " + cli::textOf(*options.part.box));
   return grid;
 }
 
@@ -640,14 +643,18 @@ bool writesSplats(const Options& options) {
 }
 
 void exportSplats(const Options& options, const EsvrFile& file, const cli::Log& log) {
-  const StoredGrid grid = partOf(file.grids[chooseGrid(options, file)], options);
+  const std::size_t chosen = chooseGrid(options, file);
+  const std::string input = options.input.string();
+  const StoredGrid grid = namingFile(input, [&] { return partOf(file.grids[chosen], options); });
   SplatOptions wanted = options.splats.made;
   wanted.colors = colorsFor(wanted.colors, grid);
   wanted.maxBytes = options.memory.maxBytes;
   if (options.output.extension() == ".usda") wanted.form = SplatForm::kUsd;
-  const MadeSplats made = makeSplats(grid, wanted);
+  const MadeSplats made = namingFile(input, [&] { return makeSplats(grid, wanted); });
   tellWhatIsMissing(made, log);
-  writeSplats(options.output, made.scene, wanted.form, options.write.overwrite);
+  namingFile(input, [&] {
+    writeSplats(options.output, made.scene, wanted.form, options.write.overwrite);
+  });
 }
 
 void importSplats(const Options& options) {

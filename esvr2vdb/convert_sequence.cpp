@@ -215,6 +215,18 @@ class SequenceDecoding {
   std::vector<Done> done_;
 };
 
+/// Frames of splats do not fit together where each has a size, a density or colors of its own.
+void tellWhatDiffers(const Options& options, const cli::Log& log) {
+  const SplatOptions& made = options.splats.made;
+  std::string own;
+  const auto add = [&](const char* what) { own += std::string(own.empty() ? "" : ", ") + what; };
+  if (options.output.extension() == ".ply" && made.form == SplatForm::kPly)
+    add("middle and size (--kind mitsuba: those of the world)");
+  if (!made.densityScale) add("density scale (--density-scale: one for all)");
+  if (made.colors.points.size() > 1) add("range of colors (--colors R,G,B: one color)");
+  if (!own.empty()) log.warning("the splats of each frame have their own " + own);
+}
+
 }  // namespace
 
 void convertSequence(const Options& options) {
@@ -224,9 +236,11 @@ void convertSequence(const Options& options) {
   std::vector<std::filesystem::path> references;
   if (options.reference) references = cli::filesOfInput(options.reference->string());
   cli::checkFrameOutputs(sequence, frames,
-                         {.extensions = {".vdb", ".nvdb"},
+                         {.extensions = {".vdb", ".nvdb", ".ply", ".usda"},
                           .mayExist = options.write.overwrite,
                           .moreInputs = references});
+  if (writesSplats(options) && frames.size() > 1)
+    tellWhatDiffers(options, cli::Log(kProgram, options.verbosity));
   SequenceDecoding(options, frames, interrupts.token()).run();
 }
 

@@ -164,7 +164,7 @@ void listSplats(const Options& options) {
             << fs::file_size(options.input) << " bytes\n\n";
   cli::Table table({"splats", "left out", "colors", "place in the world", "density scale"});
   const char* const colors = file.hasHigherDegrees ? "by direction" : "of degree 0";
-  table.add({std::to_string(file.inFile), std::to_string(file.dropped),
+  table.add({std::to_string(file.inFile), std::to_string(file.dropped()),
              splats.hasColors() ? colors : "-", file.hasPlacement ? "known" : "-",
              cli::shortNumber(file.scene.densityScale)});
   table.print(std::cout);

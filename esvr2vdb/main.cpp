@@ -60,9 +60,9 @@ cli::ProgramText programText() {
           "\"density\" and, with colors, the vectors \"Cd\".\n"
           "\n"
           "If IN.esvr holds a sequence, OUT needs a pattern such as #### for the number of the "
-          "frame in the name of the file. --list prints its frames and groups, and --check names "
-          "each frame that is lost. With a pattern, --list prints a row for the file of each "
-          "frame, and --check checks each of them.\n"
+          "frame in the name of the file, unless --frames names a single frame. --list prints its "
+          "frames and groups, and --check names each frame that is lost. With a pattern, --list "
+          "prints a row for the file of each frame, and --check checks each of them.\n"
           "\n"
           "Exit codes: 0 done, 1 failure, 2 wrong options, 3 input that is damaged or cannot be "
           "used, 5 not enough memory (--max-memory). A sequence has the code of its first frame "
@@ -122,11 +122,11 @@ cli::CommandLine commandLine() {
      "the world)")
     ("force,f", bool_switch(), "replace OUT.vdb if it exists");
   // clang-format on
-  cli::addSplatInput(line.options(),
-                     "side of a voxel in units of the world: of a grid made of splats (default: "
-                     "1/256 of the longest side of the splats' box), or of grids of IN.esvr, which "
-                     "are averaged or, if they are ellipsoids, evaluated between the voxels "
-                     "(default: as in the source)");
+  cli::addSplatInput(
+      line.options(),
+      "side of a voxel in units of the world: of a grid made of splats (default: as in their grid, "
+      "or 1/256 of their box), or of grids of IN.esvr, which are averaged or, if they are "
+      "ellipsoids, evaluated between the voxels (default: as in the source)");
   cli::addSequenceOptions(line.options());
   cli::addHostMemory(line);
   line.mainOptions({"list", "check", "grid", "lod", "bbox", "coarsen", "reference", "colors",
@@ -190,8 +190,8 @@ void readSplats(const Arguments& a, Options& options) {
     cli::refuseOptions(a, "splats in the output",
                        {"threshold", "reference", "box", "half", "coarsen", "voxel-size"});
   if (options.output.extension() == ".usda") cli::refuseOptions(a, "USD", {"kind"});
-  if (options.sequence && (isRead || isWritten))
-    throw UsageError("splats are those of a single frame; name a file of one frame");
+  if (options.sequence && isRead)
+    throw UsageError("splats are read from one file at a time; name a file without a pattern");
   options.splats.read = cli::splatInputOf(a);
   if (!isRead)
     options.resolution =
@@ -219,7 +219,7 @@ void readConversion(const Arguments& a, Options& options) {
   options.reference = a.find<std::string>("reference");
   if (const auto box = a.find<std::string>("box")) options.box = cli::parseBox(*box);
   if (options.box && !options.reference) throw UsageError("--box says nothing without --reference");
-  options.sequence = cli::readSequence(a, {.input = true});
+  options.sequence = cli::readSequence(a, {.input = true, .outputOfOneFrame = true});
   if (options.sequence && options.reference &&
       !cli::FramePattern::ofInput(options.reference->string()))
     throw UsageError("--reference needs a pattern for the number of a frame, because '" +

@@ -315,16 +315,24 @@ std::vector<std::string> CommandLine::longNames() const {
 std::optional<std::string> CommandLine::topic(const std::string& name) const {
   if (name == "man") return manPage(text_, groups());
   if (name == "options") return optionNames(groups());
-  if (name == "expert" && hasExpertHelp()) return expertText();
+  if (name == "expert") return hasExpertHelp() ? expertText() : helpText();
   const auto found = helpTopics_.find(name);
   return found == helpTopics_.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// The text of the topic that follows --help, or the whole help.
-std::string CommandLine::helpAskedFor(const po::variables_map& values) const {
+/// The text of the topic that is among the arguments, or the whole help.
+/// \param following  the word right behind --help; empty: there is none
+std::string CommandLine::helpAskedFor(const po::variables_map& values,
+                                      const std::string& following) const {
   for (const auto& word : words(values))
     if (const auto text = topic(word)) return *text;
-  return helpText();
+  if (following.empty()) return helpText();
+  std::vector<std::string> topics{"expert", "man", "options"};
+  for (const auto& [name, text] : helpTopics_) topics.push_back(name);
+  std::string list;
+  for (const auto& name : topics) list += (list.empty() ? "" : ", ") + name;
+  throw UsageError("--help has no topic '" + following + "', but " + list +
+                   didYouMean(following, topics));
 }
 
 po::variables_map CommandLine::parseValues(int argc, const char* const* argv) const {
@@ -344,6 +352,19 @@ po::variables_map CommandLine::parseValues(int argc, const char* const* argv) co
   return values;
 }
 
+namespace {
+
+/// The word right behind --help, which would be a topic; empty: there is none, or an option.
+std::string wordBehindHelp(int argc, const char* const* argv) {
+  for (int i = 1; i + 1 < argc; ++i) {
+    const std::string word = argv[i], next = argv[i + 1];
+    if (word == "--help" || word == "-h") return next.starts_with('-') ? "" : next;
+  }
+  return {};
+}
+
+}  // namespace
+
 void CommandLine::requireArguments(const po::variables_map& values) const {
   for (const Argument& argument : arguments_)
     if (argument.required && values.count(argument.name) == 0)
@@ -356,7 +377,7 @@ void CommandLine::requireArguments(const po::variables_map& values) const {
 std::optional<Arguments> CommandLine::parse(int argc, const char* const* argv) const try {
   po::variables_map values = parseValues(argc, argv);
   if (values["help"].as<bool>()) {
-    std::cout << helpAskedFor(values);
+    std::cout << helpAskedFor(values, wordBehindHelp(argc, argv));
     return std::nullopt;
   }
   if (values["version"].as<bool>()) {

@@ -144,7 +144,8 @@ class CommandLine {
   };
   [[nodiscard]] po::variables_map parseValues(int argc, const char* const* argv) const;
   void requireArguments(const po::variables_map& values) const;
-  [[nodiscard]] std::string helpAskedFor(const po::variables_map& values) const;
+  [[nodiscard]] std::string helpAskedFor(const po::variables_map& values,
+                                         const std::string& following) const;
   [[nodiscard]] std::vector<std::string> words(const po::variables_map& values) const;
   [[nodiscard]] std::optional<std::string> topic(const std::string& name) const;
   [[nodiscard]] std::vector<OptionGroup> groups() const;

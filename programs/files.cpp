@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <iostream>
 #include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <system_error>
@@ -25,11 +26,51 @@
 
 namespace esvr::cli {
 
-// Input that comes through a pipe.
+namespace fs = std::filesystem;
+
+// Names of inputs in messages.
 
 namespace {
 
-namespace fs = std::filesystem;
+struct ShownInput {
+  std::string file, name;
+};
+
+/// They are never removed: what ends a program is said after its files are gone.
+struct ShownInputs {
+  std::mutex mutex;
+  std::vector<ShownInput> all;
+};
+ShownInputs& shownInputs() {
+  static ShownInputs inputs;
+  return inputs;
+}
+
+std::string inJson(const std::string& text) {
+  const std::string quoted = jsonText(text, -1);
+  return quoted.substr(1, quoted.size() - 2);
+}
+
+}  // namespace
+
+void showInputAs(const fs::path& file, const std::string& name) {
+  const std::lock_guard lock(shownInputs().mutex);
+  shownInputs().all.push_back({file.string(), name});
+}
+
+std::string withNamesOfInputs(std::string text, bool isJson) {
+  const std::lock_guard lock(shownInputs().mutex);
+  for (const auto& [file, name] : shownInputs().all) {
+    const std::string from = isJson ? inJson(file) : file, to = isJson ? inJson(name) : name;
+    for (std::size_t at = 0; (at = text.find(from, at)) != text.npos; at += to.size())
+      text.replace(at, from.size(), to);
+  }
+  return text;
+}
+
+// Input that comes through a pipe.
+
+namespace {
 
 /// The first bytes of the formats, at most kBeginBytes, which decide the extension of the copy.
 struct PipedFormat {
@@ -78,7 +119,7 @@ std::uint64_t mostBytes(const fs::path& folder) {
   return std::uint64_t(disk.f_bavail) * disk.f_frsize / 2;
 }
 
-/// A new link in the folder to an open file. Messages show its path, so that it says what it is a copy of.
+/// A new link in the folder to an open file. Its name says what it is a copy of.
 fs::path linkTo(int fd, const fs::path& folder, const std::string& input,
                 std::string_view extension) {
   const std::string from = input == kStandardInput ? "standard-input" : "pipe";
@@ -125,6 +166,7 @@ PipedInput::PipedInput(const std::string& input, const fs::path& folder) {
       writeAll(fd_, std::span(block).first(n), folder);
     }
     path_ = linkTo(fd_, folder, input, extension);
+    showInputAs(path_, name);
   } catch (...) {
     ::close(fd_);
     throw;
@@ -255,7 +297,7 @@ std::string jsonText(const nlohmann::ordered_json& json, int indent) {
 
 void writeJson(const JsonFile& file, const nlohmann::ordered_json& json) {
   constexpr int kIndent = 2;
-  const std::string text = jsonText(json, kIndent) + '\n';
+  const std::string text = withNamesOfInputs(jsonText(json, kIndent), true) + '\n';
   if (file.path == kStandardOutput) {
     std::cout << text;
     return;

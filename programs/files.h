@@ -23,6 +23,12 @@ using esvr::WatchedInputs;
 /// The name of standard input as an input file.
 inline constexpr const char* kStandardInput = "-";
 
+/// Lets messages and reports show a file that a program made of an input under the name of this input.
+void showInputAs(const std::filesystem::path& file, const std::string& name);
+
+/// A text in which such files have the names of the inputs. \param isJson  they are in strings of JSON
+[[nodiscard]] std::string withNamesOfInputs(std::string text, bool isJson = false);
+
 /// A volume that comes through a pipe. Readers need to move back and forth in a file, so that the
 /// bytes are copied to a file first, which has no name and ends with the process.
 class PipedInput {

@@ -20,12 +20,17 @@
 #include <string_view>
 
 #include "core/atomic_file.h"
+#include "programs/files.h"
 
 namespace esvr::cli {
 
-std::string printable(const std::string& text) { return shownText(text, LineEnds::kReplace); }
+std::string printable(const std::string& text) {
+  return shownText(withNamesOfInputs(text), LineEnds::kReplace);
+}
 
-std::string printableMessage(const std::string& text) { return shownText(text, LineEnds::kKeep); }
+std::string printableMessage(const std::string& text) {
+  return shownText(withNamesOfInputs(text), LineEnds::kKeep);
+}
 
 namespace {
 

@@ -396,13 +396,16 @@ FramePattern outputPattern(const Arguments& arguments, const FramePattern& input
   const auto& text = arguments.get<std::string>("output");
   const auto output = FramePattern::in(text);
   if (output) return *output;
-  if (allowed.output) return FramePattern::whole(text);
+  const auto range = arguments.find<std::string>(kFrames);
+  const bool isOne = allowed.outputOfOneFrame && range && parseFrames(kFrames, *range).size() == 1;
+  if (allowed.output || isOne) return FramePattern::whole(text);
   const bool isInFolder = FramePattern::ofInput(text).has_value();
   throw UsageError("'" + text + "' has no pattern for the number of a frame" +
                    (isInFolder ? " in the name of the file" : "") + ", but '" + input.text() +
                    (input.isWhole() ? "' holds a sequence" : "' has one") +
                    "; each frame needs a file of its own, for example '" +
-                   withPattern(text, input.isWhole() ? kUsualPattern : input.pattern()) + "'");
+                   withPattern(text, input.isWhole() ? kUsualPattern : input.pattern()) + "'" +
+                   (allowed.outputOfOneFrame ? ", or --frames names a single frame" : ""));
 }
 
 MissingFrame missingOf(const Arguments& arguments) {

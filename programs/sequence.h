@@ -159,9 +159,10 @@ struct Sequence {
   OnFrameError onError = OnFrameError::kContinue;
 };
 
-/// The sides of a program that may be a file with all frames.
+/// The sides of a program that may be a path without a pattern.
 struct WholeFiles {
-  bool input = false, output = false;
+  bool input = false, output = false;  ///< a file with all frames
+  bool outputOfOneFrame = false;       ///< a file of the single frame that --frames names
 };
 
 /// Adds the options.

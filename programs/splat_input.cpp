@@ -9,6 +9,7 @@
 
 #include "core/atomic_file.h"
 #include "esvr/error.h"
+#include "programs/files.h"
 #include "programs/option_values.h"
 
 namespace esvr::cli {
@@ -20,13 +21,23 @@ std::optional<double> aboveZero(const Arguments& arguments, const char* option) 
   return given;
 }
 
+/// Says that the usual size of voxels makes large grids, which nobody asked for.
+void tellSize(const SplatFile& file, const SplatInput& input, const SplatGrids& grids,
+              const Log& log) {
+  constexpr std::uint64_t kMany = 16'000'000;
+  if (input.voxelSize || file.scene.indexToWorld) return;
+  const std::uint64_t active = activeVoxelCount(grids.density.volume);
+  if (active > kMany)
+    log.warning("the usual size of voxels, " + shortNumber(grids.voxelSize) + ", gives " +
+                std::to_string(active / 1'000'000) +
+                " million active voxels; --voxel-size takes a larger one");
+}
+
 void tellLeftOut(const SplatFile& file, const Log& log) {
   const auto number = [](std::uint64_t n) { return std::to_string(n); };
   log.detail(number(file.scene.splats.size()) + " of " + number(file.inFile) + " splats");
-  if (file.dropped > 0)
-    log.warning(
-        "splats are left out, because a number of them is not finite or nothing of them is seen",
-        number(file.dropped));
+  if (file.dropped() > 0)
+    log.warning("splats are left out: " + file.whyDropped(), number(file.dropped()));
   if (file.rounded > 0)
     log.detail(number(file.rounded) +
                " splats are thinner than a thousandth of their length, and were made as thick");
@@ -69,6 +80,7 @@ SplatGrids readSplatGrids(const std::filesystem::path& path, const SplatInput& i
                                        .maxBytes = memory.maxBytes,
                                        .memory = memory.voxels});
   });
+  tellSize(file, input, grids, log);
   log.detail("voxels of the size " + shortNumber(grids.voxelSize) + ", in which an extinction of " +
              shortNumber(input.densityScale.value_or(file.scene.densityScale)) +
              " for a unit of the world is a density of 1");
@@ -84,6 +96,7 @@ SplatsAsVdb::SplatsAsVdb(const Source& source, const Log& log) {
   if (!::mkdtemp(folder.data())) failAt("cannot write a file in ", source.scratch, errno);
   folder_ = folder;
   path_ = folder_ / source.path.filename().replace_extension(".vdb");
+  showInputAs(path_, withNamesOfInputs(source.path.string()));
   std::vector<GridToWrite> written{&grids.density};
   if (grids.color) written.emplace_back(&*grids.color);
   try {

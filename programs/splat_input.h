@@ -18,10 +18,11 @@ struct SplatInput {
 };
 
 /// Adds --voxel-size, --density-scale and --up.
-void addSplatInput(po::options_description& options,
-                   const char* voxelSize =
-                       "side of a voxel of a grid made of splats, in units of the world (default: "
-                       "1/256 of the longest side of the splats' box)");
+void addSplatInput(
+    po::options_description& options,
+    const char* voxelSize =
+        "side of a voxel of a grid made of splats, in units of the world (default: as in "
+        "the grid that they are from, or 1/256 of the longest side of their box)");
 
 /// \throws UsageError  an option is invalid
 [[nodiscard]] SplatInput splatInputOf(const Arguments& arguments);

@@ -286,7 +286,7 @@ void readSplats(const Arguments& a, Options& options) {
   if (!cli::isSplatFile(options.input))
     return cli::refuseOptions(a, "an input without splats", {"voxel-size", "density-scale", "up"});
   if (options.sequence)
-    throw UsageError("splats are those of a single frame; name a file of one frame");
+    throw UsageError("splats are read from one file at a time; name a file without a pattern");
   if (options.resume)
     throw UsageError("--resume continues in another run, which needs a .vdb file, not splats");
   options.splats = {options.input, cli::scratchFolderOf(a), cli::splatInputOf(a),

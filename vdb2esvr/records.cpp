@@ -32,7 +32,7 @@ Ratio ratioOf(const RunRecord& record) {
   const std::size_t converted = record.grids.size() - record.vectors.size() * (kComponents - 1);
   Ratio ratio{0, record.output.fileBytes, converted + record.carried.size(),
               record.input.grids.size()};
-  if (ratio.wholeInput()) {
+  if (ratio.wholeInput() || record.isOfSplats) {
     ratio.bytesIn = record.input.fileBytes;
     return ratio;
   }

@@ -30,7 +30,8 @@ struct ConvertedVector {
 };
 
 struct RunRecord {
-  VdbSummary input;
+  VdbSummary input;  ///< of splats: the grids that became of them, and the size of their own file
+  bool isOfSplats = false;             ///< grids have no bytes of their own in the input
   std::vector<NotFitted> carried;      ///< grids that the file holds unchanged
   std::vector<NotFitted> skipped;      ///< grids that the user left out
   std::vector<std::string> notFitted;  ///< grids that an interrupted run did not convert
@@ -51,7 +52,7 @@ struct Ratio {
   [[nodiscard]] double value() const { return double(bytesIn) / double(bytesOut); }
 };
 
-/// The grids that the output holds against the output; the whole file where it holds all.
+/// The grids that the output holds against the output; the whole file where it holds all, or has splats.
 [[nodiscard]] Ratio ratioOf(const RunRecord& record);
 
 /// Number of a carried grid in the file, which EsvrSummary uses.

@@ -387,7 +387,8 @@ Json carriedOf(const RunRecord& record) {
   for (std::size_t c = 0; c < record.carried.size(); ++c) {
     Json grid = toJson(record.carried[c]);
     grid["bytes"] = cli::ownBytes(record.output, numberOfCarried(record, c));
-    grid["source_bytes"] = record.carried[c].grid.storedBytes;
+    grid["source_bytes"] =
+        record.isOfSplats ? Json(nullptr) : Json(record.carried[c].grid.storedBytes);
     carried.push_back(grid);
   }
   return carried;

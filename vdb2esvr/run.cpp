@@ -410,6 +410,13 @@ StoreFile writingTo(const Options& options) {
 
 namespace {
 
+/// The grids are in a file that was made of splats, whose size is none of the user's.
+void takeSizeOf(const fs::path& splats, RunRecord& record) {
+  record.isOfSplats = true;
+  record.input.fileBytes = fs::file_size(splats);
+  record.input.format = "PLY";
+}
+
 RunRecord convertWatched(const Options& given, const FileRun& run,
                          const cli::WatchedInputs& watched) {
   Ranks* const ranks = run.ranks;
@@ -420,6 +427,7 @@ RunRecord convertWatched(const Options& given, const FileRun& run,
   const CancelScope scope(&cancel);
   auto devices = std::async(std::launch::async, [&] { return devicesFor(given, ranks); });
   record.input = inspectVdb(given.input);
+  if (given.splats) takeSizeOf(given.splats->path, record);
   Options options = given;
   options.read.directory = record.input.directory;
   GridChoice choice = chooseFor(options, record.input);

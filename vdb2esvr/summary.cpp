@@ -177,7 +177,7 @@ void printNotFitted(const RunRecord& record, std::ostream& out) {
     const GridSummary& grid = record.carried[c].grid;
     table.add({grid.uniqueName, grid.valueType,
                std::to_string(cli::ownBytes(record.output, numberOfCarried(record, c))),
-               std::to_string(grid.storedBytes)});
+               record.isOfSplats ? "-" : std::to_string(grid.storedBytes)});
   }
   if (!record.carried.empty()) table.print(out);
   for (const auto& [grid, place, why] : record.carried)
@@ -196,7 +196,8 @@ void printSummary(const Options& options, const RunRecord& record, std::ostream&
   printShared(record, out);
   const Ratio ratio = ratioOf(record);
   out << cli::printable(options.namedInput().string());
-  if (!ratio.wholeInput()) out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";
+  if (!ratio.wholeInput() && !record.isOfSplats)
+    out << ", " << ratio.grids << " of " << ratio.gridsOfInput << " grids:";
   out << ' ' << ratio.bytesIn << " bytes -> " << cli::printable(options.output.string()) << ' '
       << ratio.bytesOut << " bytes, 1 : " << cli::shortNumber(ratio.value()) << '\n';
 }

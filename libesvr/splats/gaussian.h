@@ -3,6 +3,7 @@
 /// derivations. And what writers and readers of files of splats have in common.
 
 #include <array>
+#include <string>
 
 #include "core/geometry.h"
 #include "esvr/ellipsoids.h"
@@ -46,6 +47,13 @@ struct PrincipalGaussian {
 };
 [[nodiscard]] PrincipalGaussian principalAxesOf(const Matrix3& columns);
 
+/// The factor by which the sizes of a splat grew when its depth became an opacity, so that the depth, summed over a
+/// picture, stayed what it was. \param depth  through the center, of which `alpha` is the share that is hidden
+[[nodiscard]] double widening(double depth, double alpha);
+
+/// The alphas that all formats keep: whole numbers of 255ths.
+inline constexpr double kAlphaSteps = 255.0;
+
 /// The first spherical harmonic, and the color of a splat whose coefficients are 0.
 inline constexpr double kFirstHarmonic = 0.28209479177387814, kMiddleColor = 0.5;
 
@@ -54,5 +62,17 @@ inline constexpr const char* kMatrixWord = "esvr_to_world";  ///< SplatScene::to
 inline constexpr const char* kUpWord = "esvr_up";            ///< y or z
 inline constexpr const char* kDensityWord = "esvr_density_scale";
 inline constexpr const char* kGridWord = "esvr_grid";
+inline constexpr const char* kLatticeWord =
+    "esvr_index_to_world";  ///< SplatScene::indexToWorld, 16 numbers
+
+// What these comments may say. Numbers beyond would overflow, and are none of a scene.
+inline constexpr double kLeastNumber = 1e-30, kMostNumber = 1e30;
+[[nodiscard]] inline bool isUsualScale(double scale) {
+  return scale > kLeastNumber && scale < kMostNumber;
+}
+/// What is wrong with SplatScene::toWorld; empty: nothing.
+[[nodiscard]] std::string faultOfToWorld(const std::array<double, 16>& toWorld);
+/// What is wrong with SplatScene::indexToWorld; empty: nothing.
+[[nodiscard]] std::string faultOfLattice(const std::array<double, 16>& indexToWorld);
 
 }  // namespace esvr::splats

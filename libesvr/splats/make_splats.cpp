@@ -84,6 +84,8 @@ double depthOfAlpha(double alpha) {
   return sum;
 }
 
+double widening(double depth, double alpha) { return std::sqrt(depth / depthOfAlpha(alpha)); }
+
 Quaternion quaternionOf(const Matrix3& rotation) {
   return asQuaternion(Eigen::Quaterniond(asEigen(rotation)));
 }
@@ -448,9 +450,9 @@ FileSpace fileSpaceOf(const StoredGrid& grid, const SplatOptions& options) {
 
 // From a Gaussian of the density to a splat.
 
-/// The alphas that all formats keep: whole numbers of 255ths, and at least one.
+/// An alpha that all formats keep, and at least one step of it.
 struct AlphaLevel {
-  static constexpr double kSteps = 255.0;
+  static constexpr double kSteps = kAlphaSteps;
   double level;
 
   /// The nearest one.
@@ -486,7 +488,7 @@ void setAlpha(double depth, Splat& splat) {
   splat.alpha = level.written();
   splat.copies = alpha * AlphaLevel::kSteps < 0.5 ? 0 : int(copies);
   // The depth, summed over a picture, stays what it was.
-  for (double& size : splat.shape.sizes) size *= std::sqrt(each / depthOfAlpha(level.alpha()));
+  for (double& size : splat.shape.sizes) size *= widening(each, level.alpha());
 }
 
 Splat splatOf(const Gaussian& g, double amplitude, const FileSpace& space,
@@ -578,6 +580,8 @@ MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options) {
   scene.densityScale = densityScaleOf(grid, options);
   const FileSpace space = fileSpaceOf(grid, options);
   scene.toWorld = space.toWorld;
+  if (const auto& affine = grid.descriptor.transform.affine; faultOfLattice(*affine).empty())
+    scene.indexToWorld = affine;
   Field gaussians = positiveOf(grid.field);
   made.negative = made.ellipsoids - gaussians.ellipsoidCount();
   AmplitudeFit fit(grid, gaussians);
@@ -585,8 +589,13 @@ MadeSplats makeSplats(const StoredGrid& grid, const SplatOptions& options) {
   becomeGaussians(gaussians);
   const std::vector<float> densities = fit.densities();
   const double present = integralOf(gaussians), wanted = integralOf(grid, Density(grid));
-  if (!(present > 0.0 && wanted > 0.0 && std::isfinite(wanted / present)))
-    refuse(grid, "its density is 0 everywhere, or too large for sums");
+  if (!(wanted > 0.0))
+    refuse(grid, "its density is 0 in all voxels from " + toString(grid.activeBox.min) + " to " +
+                     toString(grid.activeBox.max));
+  if (!(present > 0.0))
+    refuse(grid,
+           "its ellipsoids of a positive intensity have no density where its voxels have some");
+  if (!std::isfinite(wanted / present)) refuse(grid, "its density is too large for sums");
   const double extinction =
       scene.densityScale / space.perWorld * (wanted / present);  // in the file
   std::size_t number = 0;

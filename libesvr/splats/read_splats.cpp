@@ -388,7 +388,8 @@ class SplatReader {
         },
         [&] { add(row); });
     if (result_.scene.splats.size() == 0)
-      fail("none of its " + std::to_string(vertex.count) + " splats can be used");
+      fail(vertex.count > 0 ? "none of its splats can be used: " + result_.whyDropped()
+                            : "it has no splats");
   }
 
   void add(SplatRow row) {
@@ -401,10 +402,8 @@ class SplatReader {
     const double alpha = 1.0 / (1.0 + std::exp(-row[kOpacity]));
     const Quaternion q{row[kRot0], row[kRot1], row[kRot2], row[kRot3]};
     const double length = lengthOf(q);
-    const bool isSplat = float(alpha) > 0.0f && length > 0.0 && std::isfinite(length) &&
-                         std::abs(largest) <= double(kMaxLogScale) && areFinite(row);
-    if (!isSplat) {
-      ++result_.dropped;
+    if (const auto fault = faultOf(row, largest, length, alpha)) {
+      ++result_.faulty[std::size_t(*fault)];
       return;
     }
     result_.rounded += isRounded;
@@ -420,29 +419,42 @@ class SplatReader {
     splats.alpha.push_back(float(alpha));
   }
 
-  static bool areFinite(const SplatRow& row) {
-    return std::all_of(row.begin(), row.end(), [&](const double& v) {
-      return &v == &row[kOpacity] ? !std::isnan(v) : std::isfinite(float(v));
-    });
+  /// \param largest  the logarithm of the largest size, which is infinite for sizes of 0
+  static std::optional<SplatFault> faultOf(const SplatRow& row, double largest, double length,
+                                           double alpha) {
+    for (std::size_t s = 0; s < kSlots; ++s) {
+      const bool isScale = s >= kScale0 && s <= kScale2;
+      const double v = row[s];
+      if (std::isnan(v) || (s != kOpacity && !isScale && !std::isfinite(float(v))))
+        return SplatFault::kNotFinite;
+    }
+    if (largest < -double(kMaxLogScale)) return SplatFault::kTooSmall;
+    if (largest > double(kMaxLogScale)) return SplatFault::kTooLarge;
+    if (!(length > 0.0)) return SplatFault::kNoRotation;
+    if (!(float(alpha) > 0.0f)) return SplatFault::kUnseen;
+    return std::nullopt;
   }
 
   // Our comments.
-
-  /// Numbers beyond these would overflow, and are none of a scene.
-  static constexpr double kSmallest = 1e-30, kLargest = 1e30;
 
   void readPlacement() {
     SplatScene& scene = result_.scene;
     for (const std::string& comment : header_.comments) {
       const auto words = wordsOf(comment);
       if (words.size() < 2) continue;
-      if (words[1] == kMatrixWord) readMatrix(words, scene);
+      if (words[1] == kMatrixWord) {
+        scene.toWorld = matrixOf(words, kMatrixWord, faultOfToWorld);
+        result_.hasPlacement = true;
+      }
+      if (words[1] == kLatticeWord)
+        scene.indexToWorld = matrixOf(words, kLatticeWord, faultOfLattice);
       if (words[1] == kUpWord) scene.up = words.back() == "z" ? UpAxis::kZ : UpAxis::kY;
       if (words[1] == kDensityWord) scene.densityScale = readDensityScale(words);
       if (words[1] == kGridWord && words.size() > 2)
         scene.name = comment.substr(comment.find(kGridWord) + std::strlen(kGridWord) + 1);
     }
     if (result_.hasPlacement) return;
+    scene.indexToWorld.reset();
     scene.up = options_.up.value_or(UpAxis::kY);
     if (!options_.up) return;
     if (options_.up == UpAxis::kY)
@@ -451,45 +463,25 @@ class SplatReader {
       scene.toWorld = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};
   }
 
-  void readMatrix(const std::vector<std::string>& words, SplatScene& scene) {
+  template <class Fault>
+  std::array<double, 16> matrixOf(const std::vector<std::string>& words, const char* word,
+                                  const Fault& faultOfIt) const {
     constexpr std::size_t kFirst = 2, kEntries = 16;
-    if (words.size() != kFirst + kEntries)
-      fail(std::string("its comment ") + kMatrixWord + " has no 16 numbers");
+    const std::string start = std::string("its comment ") + word + ' ';
+    std::array<double, kEntries> matrix{};
+    if (words.size() != kFirst + kEntries) fail(start + "has no 16 numbers");
     for (std::size_t i = 0; i < kEntries; ++i) {
       const auto number = parseNumber(words[kFirst + i]);
-      if (!number) fail(std::string("its comment ") + kMatrixWord + " has no 16 numbers");
-      scene.toWorld[i] = *number;
+      if (!number) fail(start + "has no 16 numbers");
+      matrix[i] = *number;
     }
-    requireSimilarity(scene.toWorld);
-    result_.hasPlacement = true;
-  }
-
-  /// The matrix turns, scales alike along all axes, and shifts.
-  void requireSimilarity(const std::array<double, 16>& m) const {
-    constexpr double kTolerance = 1e-6;
-    for (const double entry : m)
-      if (!(std::abs(entry) < kLargest))
-        fail(std::string("its comment ") + kMatrixWord + " is too large");
-    const auto dot = [&](std::size_t i, std::size_t j) {
-      return m[4 * i] * m[4 * j] + m[4 * i + 1] * m[4 * j + 1] + m[4 * i + 2] * m[4 * j + 2];
-    };
-    const double square = dot(0, 0);
-    bool isOne = square > kSmallest * kSmallest && square < kLargest * kLargest && m[3] == 0.0 &&
-                 m[7] == 0.0 && m[11] == 0.0 && m[15] == 1.0;
-    for (std::size_t i = 0; i < 3; ++i)
-      for (std::size_t j = 0; j < 3; ++j)
-        isOne = isOne && std::abs(dot(i, j) - (i == j ? square : 0.0)) <= kTolerance * square;
-    const double determinant = m[0] * (m[5] * m[10] - m[6] * m[9]) -
-                               m[1] * (m[4] * m[10] - m[6] * m[8]) +
-                               m[2] * (m[4] * m[9] - m[5] * m[8]);
-    isOne = isOne && determinant > 0.0;
-    if (!isOne)
-      fail(std::string("its comment ") + kMatrixWord + " has no rotation with a scale and a shift");
+    if (const std::string fault = faultOfIt(matrix); !fault.empty()) fail(start + fault);
+    return matrix;
   }
 
   double readDensityScale(const std::vector<std::string>& words) const {
     const auto number = parseNumber(words.back());
-    if (!number || !(*number > kSmallest && *number < kLargest))
+    if (!number || !isUsualScale(*number))
       fail(std::string("its comment ") + kDensityWord + " has no usual number above 0");
     return *number;
   }
@@ -502,7 +494,66 @@ class SplatReader {
   SplatFile result_;
 };
 
+using Affine = std::array<double, 16>;
+
+double rowsDot(const Affine& m, std::size_t i, std::size_t j) {
+  return m[4 * i] * m[4 * j] + m[4 * i + 1] * m[4 * j + 1] + m[4 * i + 2] * m[4 * j + 2];
+}
+
+double determinantOf(const Affine& m) {
+  return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+         m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
+
+bool isTooLarge(const Affine& m) {
+  return !std::ranges::all_of(m, [](double entry) { return std::abs(entry) < kMostNumber; });
+}
+
+bool hasLastColumn(const Affine& m) {
+  return m[3] == 0.0 && m[7] == 0.0 && m[11] == 0.0 && m[15] == 1.0;
+}
+
 }  // namespace
+
+std::string splats::faultOfToWorld(const Affine& m) {
+  constexpr double kTolerance = 1e-6;
+  if (isTooLarge(m)) return "is too large";
+  const double square = rowsDot(m, 0, 0);
+  if (square > 0.0 && !(square > kLeastNumber * kLeastNumber)) return "is too small";
+  bool isOne = hasLastColumn(m) && square > 0.0 && square < kMostNumber * kMostNumber;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = 0; j < 3; ++j)
+      isOne = isOne && std::abs(rowsDot(m, i, j) - (i == j ? square : 0.0)) <= kTolerance * square;
+  return isOne && determinantOf(m) > 0.0 ? "" : "has no rotation with a scale and a shift";
+}
+
+std::string splats::faultOfLattice(const Affine& m) {
+  constexpr double kFlattest = 1e-9;   // of the volume of a voxel to that of a box with its edges
+  constexpr double kSmallest = 1e-14;  // volume of a voxel; OpenVDB has no transforms below 3e-15
+  if (isTooLarge(m)) return "is too large";
+  double edges = 1.0;
+  for (std::size_t i = 0; i < 3; ++i) edges *= std::sqrt(rowsDot(m, i, i));
+  const double volume = std::abs(determinantOf(m));
+  if (!hasLastColumn(m) || !(volume > kFlattest * edges)) return "is no transform of voxels";
+  return volume > kSmallest ? "" : "has voxels that are too small";
+}
+
+std::uint64_t SplatFile::dropped() const {
+  std::uint64_t all = 0;
+  for (const std::uint64_t n : faulty) all += n;
+  return all;
+}
+
+std::string SplatFile::whyDropped() const {
+  constexpr const char* kTexts[kSplatFaults] = {
+      "with a number that is not finite", "with a quaternion of 0",
+      "with a size of 0 or below e^-32", "with a size above e^32", "with an opacity of 0"};
+  std::string text;
+  for (std::size_t f = 0; f < kSplatFaults; ++f)
+    if (faulty[f] > 0)
+      text += (text.empty() ? "" : ", ") + std::to_string(faulty[f]) + ' ' + kTexts[f];
+  return text;
+}
 
 SplatFile parseSplats(std::span<const std::byte> bytes, const std::string& nameForErrors,
                       const SplatReadOptions& options) {

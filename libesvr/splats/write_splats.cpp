@@ -6,7 +6,9 @@
 #include <cmath>
 
 #include "core/atomic_file.h"
+#include "core/counted.h"
 #include "core/parallel.h"
+#include "esvr/error.h"
 #include "esvr/splats.h"
 #include "splats/gaussian.h"
 
@@ -31,20 +33,63 @@ float logit(float alpha) { return float(std::log(double(alpha)) - std::log1p(-do
 
 float harmonicOf(float color) { return float((double(color) - kMiddleColor) / kFirstHarmonic); }
 
-/// A name as a comment holds it: printable ASCII.
+/// A name as a comment holds it: printable ASCII, in a line that readers of headers take.
 std::string plainName(const std::string& name) {
+  constexpr std::size_t kLongest = 1000;
   std::string plain;
-  for (const char c : name) plain += c >= ' ' && c <= '~' ? c : '?';
-  return plain;
+  for (const char c : name.substr(0, kLongest)) plain += c >= ' ' && c <= '~' ? c : '?';
+  return name.size() > kLongest ? plain + "..." : plain;
 }
 
 // PLY.
 
+/// True if readSplats() leaves the splat out.
+bool isFaulty(const Splats& splats, std::size_t i) {
+  const auto isFinite = [&](const auto& arrays) {
+    return std::ranges::all_of(
+        arrays, [&](const auto& values) { return values.empty() || std::isfinite(values[i]); });
+  };
+  const float largest =
+      std::max({splats.logScale[0][i], splats.logScale[1][i], splats.logScale[2][i]});
+  return !(isFinite(splats.center) && isFinite(splats.logScale) && isFinite(splats.color) &&
+           std::abs(largest) <= kMaxLogScale && splats.alpha[i] > 0.0f);
+}
+
+/// What readSplats() would not read as it is.
+void requireReadable(const SplatScene& scene) {
+  const auto refuse = [&](const std::string& why) {
+    throw CannotConvert("grid \"" + shownName(scene.name) +
+                        "\" cannot become splats in a PLY file: " + why);
+  };
+  if (!isUsualScale(scene.densityScale))
+    refuse("its density scale is " + shortText(scene.densityScale) + ", and must be between " +
+           shortText(kLeastNumber) + " and " + shortText(kMostNumber) +
+           "; another one can be given (--density-scale)");
+  if (const auto fault = faultOfToWorld(scene.toWorld); !fault.empty())
+    refuse("the matrix to the world " + fault);
+  if (scene.indexToWorld)
+    if (const auto fault = faultOfLattice(*scene.indexToWorld); !fault.empty())
+      refuse("the transform of the grid " + fault);
+  std::size_t faulty = 0;
+  for (std::size_t i = 0; i < scene.splats.size(); ++i) faulty += isFaulty(scene.splats, i);
+  if (faulty > 0)
+    refuse(std::to_string(faulty) + " of " + counted(scene.splats.size(), "splat") +
+           " have a number that is not finite, or a size that is not between " +
+           shortText(std::exp(-double(kMaxLogScale))) + " and " +
+           shortText(std::exp(double(kMaxLogScale))));
+}
+
+std::string matrixComment(const char* word, const std::array<double, 16>& matrix) {
+  std::string text = std::string("comment ") + word;
+  for (const double entry : matrix) text += ' ', addNumber(text, entry);
+  return text + '\n';
+}
+
 /// What the header says about the place of the splats in the world, which readSplats() reads.
 std::string placementComments(const SplatScene& scene) {
-  std::string text = std::string("comment ") + kMatrixWord;
-  for (const double entry : scene.toWorld) text += ' ', addNumber(text, entry);
-  text += std::string("\ncomment ") + kUpWord + (scene.up == UpAxis::kZ ? " z" : " y");
+  std::string text = matrixComment(kMatrixWord, scene.toWorld);
+  if (scene.indexToWorld) text += matrixComment(kLatticeWord, *scene.indexToWorld);
+  text += std::string("comment ") + kUpWord + (scene.up == UpAxis::kZ ? " z" : " y");
   text += std::string("\ncomment ") + kDensityWord + ' ';
   addNumber(text, scene.densityScale);
   return text + "\ncomment " + kGridWord + ' ' + plainName(scene.name) + '\n';
@@ -204,6 +249,7 @@ void writeUsd(AtomicFile& file, const SplatScene& scene) {
 
 void writeSplats(const std::filesystem::path& path, const SplatScene& scene, SplatForm form,
                  bool overwrite) {
+  if (form != SplatForm::kUsd) requireReadable(scene);
   AtomicFile file(path, overwrite);
   if (form == SplatForm::kUsd)
     writeUsd(file, scene);

@@ -98,7 +98,7 @@ Table esvr2vdbTests() {
           {"--scratch", "Scratch.HoldsVoxelsOfLosslessFilesOnTheWayThereAndBack"},
           {"--threshold", "Esvr2Vdb.hasFewerActiveVoxelsAtAHigherThreshold"},
           {"--up", "SplatFiles.AreTurnedAsTheUpwardAxisSays"},
-          {"--voxel-size", "SplatFiles.ComeBackAsADensityInItsPlace"}};
+          {"--voxel-size", "SplatFiles.HaveLargeVoxelsOnlyWhereTheyAreAskedFor"}};
 }
 
 Table renderTests() {

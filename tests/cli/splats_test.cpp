@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "cli/conversion.h"
 #include "esvr/splats.h"
@@ -51,15 +52,12 @@ TEST_F(SplatFiles, ComeBackAsADensityInItsPlace) {
   const auto out = succeeded(exportTo("out.ply", "--colors 0.8,0.4,0.2"));
   EXPECT_THAT(out.out + out.err, IsEmpty());
   const VolumeGrid source = readGrid(at("in.vdb"), "density");
-  const auto& affine = *source.descriptor.transform.affine;
-  const auto back = succeeded(
-      esvr2vdb({at("out.ply"), at("back.vdb"), "--voxel-size", std::to_string(affine[0])}));
+  succeeded(esvr2vdb({at("out.ply"), at("back.vdb")}));
   EXPECT_NEAR(massOf(at("back.vdb")), massOf(at("in.vdb")), 0.05 * massOf(at("in.vdb")));
   const VolumeGrid density = readGrid(at("back.vdb"), "density");
+  EXPECT_EQ(density.descriptor.transform.affine, source.descriptor.transform.affine);
   const Box wanted = activeBox(source.volume), found = activeBox(density.volume);
-  // The grid of splats has its voxel (0, 0, 0) at the origin of the world.
-  const double shift = affine[12] / affine[0];
-  EXPECT_NEAR(0.5 * (found.min.x + found.max.x), 0.5 * (wanted.min.x + wanted.max.x) + shift, 1.5);
+  EXPECT_NEAR(0.5 * (found.min.x + found.max.x), 0.5 * (wanted.min.x + wanted.max.x), 1.5);
   const VectorGrid color = readVector(at("back.vdb"), "Cd");
   const Coord middle{(found.min.x + found.max.x) / 2, (found.min.y + found.max.y) / 2,
                      (found.min.z + found.max.z) / 2};
@@ -113,7 +111,7 @@ TEST_F(SplatFiles, AreNamedByTheErrorsOfTheirGrids) {
   for (const auto& [more, code, why] : std::vector<std::tuple<Words, int, std::string>>{
            {"--voxel-size 1e-9", 3, "reaches beyond the index space"},
            {"--voxel-size 1e9", 3, "too faint for any active voxel of the size 1e+09"},
-           {"--max-memory 20KB", 3, "more voxels than there is memory for"}}) {
+           {"--voxel-size 0.02 --max-memory 20KB", 3, "more voxels than there is memory for"}}) {
     EXPECT_THAT(esvr2vdb(joined({at("out.ply"), at("out.vdb")}, more)),
                 Fails(code, at("out.ply"), why));
     EXPECT_THAT(vdb2esvr(joined({at("out.ply"), at("out.esvr")}, more)),
@@ -121,11 +119,42 @@ TEST_F(SplatFiles, AreNamedByTheErrorsOfTheirGrids) {
   }
 }
 
+TEST_F(SplatFiles, HaveTheSizeOfTheirFileInRatiosAndReports) {
+  succeeded(exportTo("out.ply"));
+  const std::string bytes = std::to_string(sizeOf("out.ply"));
+  const std::string options = " --voxel-size 1 --preset draft --force --report " + at("r.json");
+  const auto expectSize = [&](const ProgramRun& run) {
+    EXPECT_THAT(succeeded(run).out, HasSubstr(" " + bytes + " bytes -> "));
+    const auto report = nlohmann::json::parse(readText(at("r.json")));
+    EXPECT_EQ(report["input"]["format"], "PLY");
+    EXPECT_EQ(report["input"]["bytes"], sizeOf("out.ply"));
+    EXPECT_EQ(report["input"]["bytes_converted"], sizeOf("out.ply"));
+    EXPECT_EQ(report["ratio"], double(sizeOf("out.ply")) / double(sizeOf("out.esvr")));
+  };
+  const std::string command = std::string(VDB2ESVR) + " ";
+  expectSize(runShell(command + at("out.ply") + " " + at("out.esvr") + options));
+  expectSize(runShell(command + at("out.ply") + " " + at("out.esvr") + options + " --skip Cd"));
+  expectSize(runShell(command + "- " + at("out.esvr") + options + " < " + at("out.ply")));
+  succeeded(vdb2esvr({at("out.ply"), at("out.esvr"), "--voxel-size", "1", "--force", "--skip", "Cd",
+                      "--ratio", "2"}));
+  EXPECT_LE(2 * sizeOf("out.esvr"), sizeOf("out.ply"));
+}
+
 TEST_F(SplatFiles, AreTakenFromAPipe) {
   succeeded(exportTo("out.ply"));
   succeeded(runShell("cat " + at("out.ply") + " | " + ESVR2VDB + " - " + at("piped.vdb") +
                      " --voxel-size 1"));
   EXPECT_GT(massOf(at("piped.vdb")), 0.0);
+  const std::string scratch = " --scratch " + folder_.path().string();
+  for (const std::string command :
+       {ESVR2VDB " - x.vdb", VDB2ESVR " - x.esvr", ESVR2VDB " --list -"})
+    EXPECT_THAT(runShell("printf 'ply\\nformat ascii 1.0\\n' | " + command + scratch),
+                Fails(3, ": standard input: its header has no end"));
+  const auto run = runShell(std::string(VDB2ESVR) + " - " + at("piped.esvr") +
+                            " -g nothing --voxel-size 1 --report " + at("r.json") + scratch +
+                            " < " + at("out.ply"));
+  EXPECT_THAT(run, Fails(3, "standard input"));
+  EXPECT_THAT(run.err + readText(at("r.json")), Not(HasSubstr("esvr-s")));
 }
 
 TEST_F(SplatFiles, AreTurnedAsTheUpwardAxisSays) {
@@ -160,6 +189,46 @@ TEST_F(SplatFiles, DropSplatsThatAreNotFiniteAndSaySo) {
   EXPECT_THAT(run.err, HasSubstr("(1)"));
 }
 
+TEST_F(SplatFiles, AreWrittenForFramesOfASequence) {
+  for (const char* frame : {"41", "42"})
+    writeInput(at("in." + std::string(frame) + ".vdb"), {{.voxels = softBall({20, -10, 5})}});
+  succeeded(quickFit(at("in.##.vdb"), at("seq.esvr"), "--tone off"));
+  succeeded(quickFit(at("in.##.vdb"), at("f.##.esvr"), "--tone off"));
+  EXPECT_THAT(esvr2vdb({at("seq.esvr"), at("q.ply")}),
+              Fails(2, "q.####.ply', or --frames names a single frame"));
+  const auto run = succeeded(esvr2vdb({at("seq.esvr"), at("q.####.ply")}));
+  EXPECT_THAT(run.err, Says("splats of each frame have their own middle and size", "--kind mitsuba",
+                            "--density-scale", "--colors"));
+  succeeded(esvr2vdb({at("seq.esvr"), at("one.ply"), "--frames", "42"}));
+  EXPECT_EQ(readText(at("one.ply")), readText(at("q.0042.ply")));
+  EXPECT_THAT(readText(at("q.0041.ply")), HasSubstr("element vertex"));
+  const auto alike = succeeded(
+      esvr2vdb({at("f.##.esvr"), at("u.##.usda"), "--density-scale", "0.3", "--colors", "1,1,1"}));
+  EXPECT_THAT(alike.err, IsEmpty());
+  EXPECT_THAT(readText(at("u.42.usda")), HasSubstr("ParticleField3DGaussianSplat"));
+  succeeded(esvr2vdb({at("f.##.esvr"), at("one.vdb"), "--frames", "42"}));
+  EXPECT_TRUE(std::filesystem::exists(at("one.vdb")));
+  EXPECT_THAT(esvr2vdb({at("seq.esvr"), at("two.ply"), "--frames", "41-42"}), Fails(2, "####"));
+  EXPECT_THAT(esvr2vdb({at("q.####.ply"), at("b.####.vdb")}), Fails(2, "one file at a time"));
+  EXPECT_THAT(vdb2esvr({at("q.####.ply"), at("b.esvr")}), Fails(2, "one file at a time"));
+}
+
+TEST_F(SplatFiles, HaveLargeVoxelsOnlyWhereTheyAreAskedFor) {
+  // Eight splats of another program that fill a cube.
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float "
+      "z\nproperty float opacity\nproperty float scale_0\nproperty float scale_1\nproperty float "
+      "scale_2\nproperty float rot_0\nproperty float rot_1\nproperty float rot_2\nproperty float "
+      "rot_3\nend_header\n";
+  for (const char* place : {"0 0 0", "0 0 9", "0 9 0", "0 9 9", "9 0 0", "9 0 9", "9 9 0", "9 9 9"})
+    text += std::string(place) + " 2 1.2 1.2 1.2 1 0 0 0\n";
+  writeText(at("other.ply"), text);
+  EXPECT_THAT(succeeded(esvr2vdb({at("other.ply"), at("large.vdb")})).err,
+              Says("million active voxels", "--voxel-size"));
+  EXPECT_THAT(succeeded(esvr2vdb({at("other.ply"), at("small.vdb"), "--voxel-size", "0.5"})).err,
+              IsEmpty());
+}
+
 TEST_F(SplatFiles, RefuseWhatMakesNoSenseAndLeaveNothing) {
   succeeded(exportTo("out.ply"));
   const std::string text = readText(at("out.ply"));
@@ -191,6 +260,8 @@ TEST_F(SplatFiles, RefuseWhatMakesNoSenseAndLeaveNothing) {
            Refusal{"DIR/in.esvr DIR/new.ply --colors 1,2,3", 2, "--colors"},
            Refusal{"DIR/in.esvr DIR/new.ply --density-scale -1", 2, "--density-scale"},
            Refusal{"DIR/in.esvr DIR/new.ply -g heat", 3, "heat"},
+           Refusal{"DIR/in.esvr DIR/new.ply --bbox 900,0,0,910,9,9", 3,
+                   "in.esvr: grid \"density\" has nothing in the box of --bbox"},
            Refusal{"DIR/in.esvr DIR/out.ply", 1, "exists"},
        }) {
     SCOPED_TRACE(refusal);

@@ -357,7 +357,7 @@ TEST_F(Vdb2Esvr, leavesNoCopyOfAPipeAndRefusesOtherBytes) {
               Fails(3, "standard input is neither"));
   EXPECT_THAT(vdb2esvr({"-", folder_ / "x.esvr"}), Fails(3)) << "an empty input";
   EXPECT_THAT(runShell("head -c 300 " + in() + " | " + tmp + quickly("-", folder_ / "x.esvr")),
-              Fails(3, "esvr-standard-input-"));
+              Fails(3, "vdb2esvr: standard input: "));
 }
 
 TEST_F(Vdb2Esvr, fitsNoMixtureOfAFileThatIsReplacedWhileItIsReadSlow) {

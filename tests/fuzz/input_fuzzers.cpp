@@ -65,7 +65,7 @@ ESVR_FUZZER(splats) {
     const auto file =
         parseSplats(std::as_bytes(std::span(data, size)), "fuzz", {.maxBytes = kMaxBytes});
     check(file.scene.splats);
-    require(file.scene.splats.size() + file.dropped == file.inFile);
+    require(file.scene.splats.size() + file.dropped() == file.inFile);
     const auto grids = makeSplatGrids(file.scene, {.voxelSize = 1.0, .maxBytes = kMaxBytes});
     for (const float v : grids.density.volume.values) require(std::isfinite(v));
   } catch (const Error&) {

@@ -212,10 +212,10 @@ TEST(CommandLine, helpSaysAllAndNeedsNoArguments) {
 }
 
 /// What a command line prints for `--help` and a topic.
-std::string helpOf(const CommandLine& line, const char* topic) {
+std::string helpOf(const CommandLine& line, const char* topic = nullptr) {
   const char* const given[] = {"esvr-example", "--help", topic};
   CaptureStdout();
-  EXPECT_FALSE(line.parse(3, given));
+  EXPECT_FALSE(line.parse(topic ? 3 : 2, given));
   return GetCapturedStdout();
 }
 
@@ -229,13 +229,29 @@ TEST(CommandLine, expertHelpHasWhatTheMainHelpLeavesOut) {
   line.options().add_options()("size", po::value<int>(), "how large")("low", po::value<int>(), "");
   line.mainOptions({"size"});
   EXPECT_THAT(
-      helpOf(line, "x"),
+      helpOf(line),
       testing::AllOf(HasSubstr("--size"), HasSubstr("For all."), HasSubstr("--help expert"),
                      testing::Not(HasSubstr("--low")), testing::Not(HasSubstr("For experts."))));
   EXPECT_THAT(helpOf(line, "expert"), testing::AllOf(HasSubstr("--low"), HasSubstr("For experts."),
                                                      testing::Not(HasSubstr("--size"))));
   EXPECT_EQ(helpOf(line, "options").substr(0, 13), "--size\n--low\n");
   EXPECT_THAT(helpOf(line, "man"), test::Says("low", "For experts."));
+}
+
+TEST(CommandLine, helpRefusesATopicThatItHasNot) {
+  CommandLine line = exampleLine();
+  line.helpTopic("paper", "On papers.");
+  EXPECT_THAT([&] { (void)helpOf(line, "expret"); },
+              test::ThrowsSaying<UsageError>("no topic 'expret', but expert, man, options, paper; "
+                                             "did you mean expert?"));
+  GetCapturedStdout();
+  EXPECT_EQ(helpOf(line, "paper"), "On papers.");
+  for (const char* other : {"--quiet", "-s3"}) {
+    const char* const given[] = {"esvr-example", "in.vdb", "--help", other};
+    CaptureStdout();
+    EXPECT_FALSE(line.parse(4, given));
+    EXPECT_THAT(GetCapturedStdout(), HasSubstr("Does an example."));
+  }
 }
 
 TEST(CommandLine, helpHasAllWhereNothingIsForExperts) {

@@ -27,6 +27,7 @@
 #include "esvr/error.h"
 #include "esvr/splats.h"
 #include "support/files.h"
+#include "support/messages.h"
 
 namespace esvr {
 namespace {
@@ -41,6 +42,7 @@ SplatScene someScene() {
   scene.up = UpAxis::kZ;
   scene.densityScale = 0.375;
   scene.toWorld = {0, 0.1, 0, 0, -0.1, 0, 0, 0, 0, 0, 0.1, 0, 5, 6, 7, 1};
+  scene.indexToWorld = {0, 0.3, 0, 0, -0.1, 0, 0, 0, 0, 0.05, 0.7, 0, 1, 2, 1.0 / 3, 1};
   scene.splats.resize(2, true);
   for (std::size_t i = 0; i < 2; ++i) {
     const float k = float(i);
@@ -69,6 +71,7 @@ TEST(WriteSplats, AreReadBackWithTheirPlaceInTheWorld) {
     const SplatFile back = readSplats(folder / "out.ply");
     EXPECT_TRUE(back.hasPlacement);
     EXPECT_EQ(back.scene.toWorld, scene.toWorld);
+    EXPECT_EQ(back.scene.indexToWorld, scene.indexToWorld);
     EXPECT_EQ(back.scene.up, UpAxis::kZ);
     EXPECT_EQ(back.scene.densityScale, 0.375);
     EXPECT_EQ(back.scene.name, "smoke 1");
@@ -94,6 +97,44 @@ TEST(WriteSplats, GiveViewersTheHeaderThatAllOfThemRead) {
     properties += std::string("property float ") + name + '\n';
   EXPECT_THAT(header, HasSubstr(properties + "end_header\n"));
   EXPECT_EQ(text.size(), header.size() + 2 * 14 * sizeof(float));
+}
+
+TEST(WriteSplats, RefuseWhatReadersWouldRefuseOrLeaveOut) {
+  const test::TemporaryFolder folder;
+  const auto expectRefusal = [&](const auto& change, const char* why) {
+    SplatScene scene = someScene();
+    change(scene);
+    EXPECT_THAT([&] { writeSplats(folder / "no.ply", scene, SplatForm::kPly); },
+                test::ThrowsSaying<CannotConvert>(why));
+    EXPECT_FALSE(std::filesystem::exists(folder / "no.ply"));
+  };
+  expectRefusal(
+      [](SplatScene& s) { s.densityScale = 2.3e30; },
+      "grid \"smoke 1\" cannot become splats in a PLY file: its density scale is 2.3e+30");
+  expectRefusal([](SplatScene& s) { s.densityScale = 1e-30; }, "its density scale is 1e-30");
+  expectRefusal([](SplatScene& s) { s.toWorld[12] = 1e30; }, "matrix to the world is too large");
+  expectRefusal(
+      [](SplatScene& s) {
+        for (double& m : s.toWorld) m = m == 1.0 ? m : m * 1e-30;
+      },
+      "matrix to the world is too small");
+  expectRefusal([](SplatScene& s) { (*s.indexToWorld)[14] = -2e30; },
+                "transform of the grid is too large");
+  expectRefusal([](SplatScene& s) { s.splats.logScale[0][1] = 33.0f; },
+                "1 of 2 splats have a number that is not finite, or a size");
+  expectRefusal(
+      [](SplatScene& s) {
+        for (auto& size : s.splats.logScale) size[0] = -32.5f;
+      },
+      "1 of 2 splats");
+  expectRefusal([](SplatScene& s) { s.splats.center[2][0] = std::nanf(""); }, "1 of 2 splats");
+  SplatScene extreme = someScene();
+  for (const double scale : {1.1e-30, 0.9e30}) {
+    extreme.densityScale = scale;
+    extreme.name.assign(100000, 'n');
+    writeSplats(folder / "out.ply", extreme, SplatForm::kPly, true);
+    EXPECT_EQ(readSplats(folder / "out.ply").scene.densityScale, scale);
+  }
 }
 
 // USD.
@@ -385,7 +426,10 @@ TEST(ReadSplats, DropsAndCountsWhatIsNotFinite) {
   const SplatFile file = parse(ply.text());
   expectUsual(file);
   EXPECT_EQ(file.inFile, 9u);
-  EXPECT_EQ(file.dropped, 8u);
+  EXPECT_EQ(
+      file.whyDropped(),
+      "6 with a number that is not finite, 1 with a quaternion of 0, 1 with a size above e^32");
+  EXPECT_EQ(file.dropped(), 8u);
 }
 
 TEST(ReadSplats, TakesAnOpaqueFlatSplat) {
@@ -446,7 +490,18 @@ TEST(ReadSplats, RefusesWhatIsNoFileOfSplatsAndSaysWhy) {
   expectRefusal(text.text() + "word", "no number");
   text.rows = {std::vector<double>(14, kNan)};
   text.format = "binary_little_endian";
-  expectRefusal(text.text(), "none of its 1 splats");
+  expectRefusal(text.text(), "none of its splats can be used: 1 with a number that is not finite");
+  text.rows.assign(50, usualRow());
+  for (auto& row : text.rows) row[10] = row[13] = 0.0;
+  text.rows[0] = usualRow();
+  for (const std::size_t slot : {7u, 8u, 9u}) text.rows[0][slot] = -kInfinity;
+  text.rows[1][6] = -kInfinity, text.rows[1][10] = 1.0;
+  expectRefusal(text.text(),
+                "none of its splats can be used: 48 with a quaternion of 0, 1 with a size of 0 or "
+                "below e^-32, 1 with an opacity of 0");
+  expectRefusal(replaced("comment made by a test",
+                         "comment esvr_index_to_world 1 0 0 0 0 1 0 0 1 1 0 0 0 0 0 1"),
+                "esvr_index_to_world is no transform of voxels");
 }
 
 TEST(ReadSplats, RefusesMoreSplatsThanTheMemoryHolds) {

@@ -48,6 +48,10 @@ struct SplatScene {
   UpAxis up = UpAxis::kY;  ///< of the world
   /// The extinction of a length of one unit of the world, for a density of 1.
   double densityScale = 1.0;
+  /// Of the grid from whose ellipsoids makeSplats() made the splats: the map from its index space to the world, as
+  /// Transform::affine. Their sizes then grew with their depth, which makeSplatGrids() undoes. Nothing for voxels that are
+  /// so small or flat that OpenVDB makes no transform of them.
+  std::optional<std::array<double, 16>> indexToWorld{};
 };
 
 // Files.
@@ -62,6 +66,8 @@ enum class SplatForm {
 };
 
 /// Writes the whole file or nothing.
+/// \throws CannotConvert  readSplats() would refuse the PLY file, or leave splats out: the density scale or a matrix is
+///                        not between 1e-30 and 1e30, or a size not between e^-32 and e^32
 /// \throws RuntimeFailure  the file exists (without `overwrite`) or is not writable; the disk is full
 void writeSplats(const std::filesystem::path& path, const SplatScene& scene, SplatForm form,
                  bool overwrite = false);
@@ -73,11 +79,19 @@ struct SplatReadOptions {
   std::optional<UpAxis> up = UpAxis::kY;
 };
 
+/// Why a splat is left out. A size is the largest of its three standard deviations.
+enum class SplatFault { kNotFinite, kNoRotation, kTooSmall, kTooLarge, kUnseen };
+inline constexpr std::size_t kSplatFaults = 5;
+
 struct SplatFile {
   SplatScene scene;
   std::uint64_t inFile = 0;  ///< splats in the file
-  std::uint64_t dropped =
-      0;  ///< those that were left out because a number is not finite, or alpha is 0
+  std::array<std::uint64_t, kSplatFaults>
+      faulty{};  ///< those that were left out, by their SplatFault
+  /// The number of all that were left out.
+  [[nodiscard]] std::uint64_t dropped() const;
+  /// Why they were left out: "3 with a quaternion of 0, 1 with an opacity of 0".
+  [[nodiscard]] std::string whyDropped() const;
   std::uint64_t rounded = 0;      ///< those with a smallest size that was raised (kMostFlat)
   bool hasPlacement = false;      ///< the file says where its splats are in the world
   bool hasHigherDegrees = false;  ///< colors that depend on the direction were ignored
@@ -135,8 +149,9 @@ struct MadeSplats {
 // From splats to grids.
 
 struct SplatGridOptions {
-  /// The side of a voxel in the world, above 0. Default: 1/256 of the longest side of the box of the centers,
-  /// of which 1 % at each end of every axis does not count.
+  /// The shortest edge of a voxel in the world, above 0. Default: that of SplatScene::indexToWorld, or else 1/256 of
+  /// the longest side of the box of the centers, of which 1 % at each end of every axis does not count. Where there is
+  /// such a map, voxels of any size are on its lattice (transformAt in esvr/resolution.h).
   std::optional<double> voxelSize{};
   std::optional<double> densityScale{};  ///< default: SplatScene::densityScale
   std::uint64_t maxBytes =
@@ -148,7 +163,7 @@ struct SplatGrids {
   VolumeGrid density;  ///< a fog volume
   std::optional<VectorGrid>
       color;  ///< "Cd", the mean color of the splats at a voxel, weighted by their density
-  double voxelSize = 0.0;
+  double voxelSize = 0.0;  ///< the shortest edge
   std::uint64_t thickened =
       0;  ///< splats thinner than voxels, which were made kThinnest voxels thick
 };
