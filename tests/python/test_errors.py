@@ -7,6 +7,28 @@ import esvr
 ONES = np.ones((2, 2, 2))
 
 
+@pytest.mark.parametrize("call, text", [
+    (lambda v: esvr.fit(v, psrn=4), "esvr.fit() has no argument psrn; did you mean psnr?"),
+    (lambda v: esvr.convert([v], max_eror=4), "esvr.convert() has no argument max_eror; did you mean max_error?"),
+    (lambda v: esvr.write("a.esvr", [], overwrit=True), "esvr.write() has no argument overwrit; did you mean overwrite?"),
+    (lambda v: esvr.Volume.from_numpy(ONES, voxelsize=2), "Volume.from_numpy() has no argument voxelsize; did you mean voxel_size?"),
+    (lambda v: v.to_xarray(mask=True), "Volume.to_xarray() has no argument mask; did you mean masked?"),
+    (lambda v: v.render(colour="magma"), "Volume.render() has no argument colour; did you mean colors?"),
+    (lambda v: esvr.GridBuilder("float", nam="a"), "GridBuilder() has no argument nam; did you mean name?"),
+    (lambda v: esvr.Sequence("a.esvr", limit=3), "Sequence() has no argument limit; it has: path, max_memory")])
+def test_a_misspelt_argument_is_named(volume, call, text):
+    with pytest.raises(TypeError) as raised:
+        call(volume)
+    assert str(raised.value) == text
+
+
+def test_other_errors_are_those_of_the_function(volume):
+    with pytest.raises(TypeError, match="incompatible function arguments"):
+        esvr.fit(3, psnr=40)
+    with pytest.raises(ZeroDivisionError):
+        esvr.fit(volume, count=40, preset="draft", device="cpu", progress=lambda share: 1 / 0)
+
+
 @pytest.mark.parametrize("call", [
     lambda: esvr.Volume.from_numpy([[1], [1, 2]]),
     lambda: esvr.Volume.from_numpy(ONES, metadata={1: 2}),

@@ -139,3 +139,15 @@ def test_repr_of_a_file_has_its_grids(volume):
     assert second == "'b': stored as voxels, 2 x 2 x 2 voxels from (0, 0, 0), 8 active, values 1 to 1, voxel size 1 x 2 x 3>"
     many = repr(esvr.convert([ones] * 25, lossless=True, device="cpu"))
     assert many.count("\n") == 21 and "'b[1]': " in many and many.endswith("\n  and 5 more>")
+
+
+def test_dask_knows_equal_objects(volume, grid):
+    """Otherwise, Dask would compute again what it has a result of."""
+    tokenize = pytest.importorskip("dask.base", reason="Debian: python3-dask").tokenize
+    file = esvr.convert([volume], lossless=True, device="cpu")
+    things = [volume, grid, file, grid.ellipsoids, esvr.compare(volume, grid)]
+    for thing in things:
+        assert tokenize(thing) == tokenize(again(thing)) == tokenize(copy.copy(thing))
+    assert len({tokenize(thing) for thing in things}) == len(things)
+    larger = esvr.Volume.from_numpy(volume.to_numpy(), origin=volume.box[0], voxel_size=0.6)
+    assert tokenize(larger) != tokenize(volume)

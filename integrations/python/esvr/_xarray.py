@@ -48,7 +48,7 @@ def with_rising_coordinates(array):
             first, step = first + step * (array.sizes[name] - 1), -step
         steps.append((step, first, unit))
     for note in notes:
-        warnings.warn(note, stacklevel=3)
+        warnings.warn(note, stacklevel=4)
     return array, steps
 
 
@@ -78,14 +78,14 @@ def volume_of(array, *, background=0.0, threshold=None, name=None, grid_class="f
                              name=str(name or array.name or "density"), grid_class=grid_class, metadata=metadata)
 
 
-def masked_of(volume, box=None):
+def masked_of(self, box=None):
     """The voxels of a box as a masked array of NumPy, of shape (nx, ny, nz): inactive voxels are masked. Volume.from_numpy takes
     such an array; with active=~array.mask, voxels that have the value of the background stay active."""
     import numpy as np
-    return np.ma.MaskedArray(volume.to_numpy(box), mask=~volume.active(box), fill_value=volume.background)
+    return np.ma.MaskedArray(self.to_numpy(box), mask=~self.active(box), fill_value=self.background)
 
 
-def array_of(volume, box=None, *, masked=True):
+def array_of(self, box=None, *, masked=True):
     """An xarray.DataArray with the dimensions x, y and z (Debian and Ubuntu: python3-xarray).
 
     Inactive voxels are NaN, or have the background if masked is false. Coordinates are those of the world if the transform scales
@@ -93,12 +93,12 @@ def array_of(volume, box=None, *, masked=True):
     """
     import numpy as np
     import xarray
-    first, last = box or volume.box or ((0, 0, 0), (0, 0, 0))
+    first, last = box or self.box or ((0, 0, 0), (0, 0, 0))
     box = (tuple(first), tuple(last))
-    values = volume.to_numpy(box)
+    values = self.to_numpy(box)
     if masked:
-        values = np.where(volume.active(box), values, np.float32(np.nan))
-    matrix, metadata, attributes = volume.transform, volume.metadata, {}
+        values = np.where(self.active(box), values, np.float32(np.nan))
+    matrix, metadata, attributes = self.transform, self.metadata, {}
     places = [np.arange(low, high + 1, dtype=np.float64) for low, high in zip(*box)]
     is_plain = matrix is not None and np.array_equal(matrix[:3, :3], np.diag(np.diag(matrix[:3, :3])))
     unit = {}
@@ -109,5 +109,5 @@ def array_of(volume, box=None, *, masked=True):
         attributes["transform"] = matrix.ravel().tolist()
     if "value_unit" in metadata:
         attributes["units"] = metadata["value_unit"]
-    return xarray.DataArray(values, dims=tuple(SPACE), name=volume.name, attrs=attributes, coords={
+    return xarray.DataArray(values, dims=tuple(SPACE), name=self.name, attrs=attributes, coords={
         axis: (axis, place, unit) for axis, place in zip(SPACE, places)})

@@ -393,7 +393,7 @@ void tellLostValues(const Volume& volume) {
   const std::string text = "grid '" + shownName(volume.grid->descriptor.name) + "' loses " +
                            toText(inactive) +
                            "; the program vdb2esvr keeps them with --lossless or --keep";
-  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), kCaller) != 0) throw py::error_already_set();
 }
 
 constexpr const char* kFitText = "Converts a volume to a Grid. ";

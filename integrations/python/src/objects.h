@@ -119,6 +119,9 @@ void addDescriptor(py::class_<T>& type) {
       .def("__repr__", [](const T& object) { return describe(object); });
 }
 
+/// The stack level of warnings: the caller of the function that explains wrong arguments (esvr/_keywords.py).
+inline constexpr py::ssize_t kCaller = 2;
+
 /// \throws MemoryExceeded  an array over the box would have more bytes than there are addresses
 void requireAddressable(const Box& box, std::size_t bytesOfElement);
 
