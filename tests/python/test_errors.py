@@ -12,6 +12,8 @@ ONES = np.ones((2, 2, 2))
     (lambda v: esvr.convert([v], max_eror=4), "esvr.convert() has no argument max_eror; did you mean max_error?"),
     (lambda v: esvr.write("a.esvr", [], overwrit=True), "esvr.write() has no argument overwrit; did you mean overwrite?"),
     (lambda v: esvr.Volume.from_numpy(ONES, voxelsize=2), "Volume.from_numpy() has no argument voxelsize; did you mean voxel_size?"),
+    (lambda v: esvr.Volume.from_xarray(v, nonfinit="keep"),
+     "Volume.from_xarray() has no argument nonfinit; did you mean nonfinite?"),
     (lambda v: v.to_xarray(mask=True), "Volume.to_xarray() has no argument mask; did you mean masked?"),
     (lambda v: v.render(colour="magma"), "Volume.render() has no argument colour; did you mean colors?"),
     (lambda v: esvr.GridBuilder("float", nam="a"), "GridBuilder() has no argument nam; did you mean name?"),

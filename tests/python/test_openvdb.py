@@ -79,6 +79,17 @@ def test_a_frustum_comes_back():
     assert matrix(volume.to_pyopenvdb().transform) == matrix(transform)
 
 
+def test_an_array_of_xarray_does_not_lose_a_frustum_without_a_word():
+    pytest.importorskip("xarray")
+    transform = vdb.createFrustumTransform((0, 0, 0), (99, 99, 49), taper=0.5, depth=2.0, voxelSize=0.1)
+    volume = esvr.Volume.from_pyopenvdb(fog(transform))
+    with pytest.warns(UserWarning, match="is a frustum") as told:
+        array = volume.to_xarray()
+    assert told[0].filename == __file__
+    with pytest.raises(esvr.UsageError, match="indices of voxels"):
+        esvr.Volume.from_xarray(array)
+
+
 def test_warnings_name_the_line_of_the_caller():
     transform = vdb.createFrustumTransform((0, 0, 0), (99, 99, 49), taper=0.5, depth=2.0, voxelSize=0.1)
     grid = fog(transform)
