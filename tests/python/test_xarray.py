@@ -101,7 +101,16 @@ def test_every_transform_comes_back(transform, shape):
     same_place(esvr.Volume.from_xarray(single), volume)
 
 
-@pytest.mark.parametrize("transform", [TURNED, MIRRORED])
+def test_results_of_operations_keep_their_place():
+    """Those that drop the attributes of an array keep those of its coordinates."""
+    volume = esvr.Volume.from_numpy(np.ones((1, 2, 3)), transform=np.diag([0.1, 0.2, 0.3, 1.0]), origin=(-7, 3, 40))
+    sums = 2 * volume.to_xarray()
+    assert "transform" not in sums.attrs
+    assert np.allclose(esvr.Volume.from_xarray(sums).transform,
+                       [[0.1, 0, 0, -0.7], [0, 0.2, 0, 0.6], [0, 0, 0.3, 12], [0, 0, 0, 1]])
+
+
+@pytest.mark.parametrize("transform", [TURNED, MIRRORED, np.diag([0.1, 0.2, 0.3, 1.0])])
 def test_parts_and_averages_stay_in_their_place(transform):
     volume = esvr.Volume.from_numpy(np.arange(1.0, 65.0).reshape(4, 4, 4), transform=transform, origin=(8, 0, 0))
     array, place = volume.to_xarray(), np.array(transform) @ [10, 1, 3, 1]
@@ -121,7 +130,10 @@ def test_contradictions_are_refused():
     plain = esvr.Volume.from_numpy(ones, voxel_size=0.1).to_xarray()
     turned = esvr.Volume.from_numpy(ones, transform=TURNED).to_xarray()
     refused(plain.assign_attrs(transform=np.diag([7.0, 7, 7, 1]).ravel()), "dimension x contradict.*step is 0.1.*voxels 7")
+    refused(plain.assign_attrs(transform=np.diag([0.05, 0.1, 0.1, 1]).ravel()), "dimension x contradict.*step is 0.1.*voxels 0.05")
     refused(plain.assign_coords(y=plain.y * 1.5), "dimension y contradict")
+    refused(plain.assign_coords(y=plain.y * 2), "dimension y contradict")
+    refused(turned.assign_coords(y=turned.y * 2), "dimension y contradict")
     refused(plain.assign_coords(z=plain.z + 0.03), "dimension z contradict.*begin at 0.03")
     refused(plain.assign_coords(z=[0.0, 0.1, 0.3]), "dimension z contradict.*steps of the axis z differ")
     refused(turned.assign_coords(x=turned.x * 0.1), "dimension x contradict")

@@ -11,6 +11,8 @@ from ._core import UsageError, Volume
 SPACE = "xyz"
 # The attribute long_name of coordinates that are no places in the world.
 INDEX = "index of the voxel"
+# The attribute of coordinates in the world that has the size of voxels along them, with a sign, so that they belong to a matrix.
+VOXEL = "voxel_size"
 
 
 def axes_of(array):
@@ -79,6 +81,8 @@ def placed_by_coordinates(array):
                 "are in the world, is missing: operations of xarray drop attributes unless xarray.set_options(keep_attrs=True); give "
                 "the array the attribute again, or drop the coordinates to count voxels (array.drop_vars)")
         step, first, unit = step_along(array, name, notes)
+        if name in array.coords and array.sizes[name] == 1 and isinstance(array.coords[name].attrs.get(VOXEL), float):
+            step = array.coords[name].attrs[VOXEL]  # one place has no step
         if step < 0:
             array, step, first = turned_round(array, name, step, first)
         steps.append((step, first, unit))
@@ -116,9 +120,10 @@ def is_plain(matrix):
     return np.array_equal(matrix[:3, :3], np.diag(np.diag(matrix[:3, :3]))) and np.all(np.diag(matrix))
 
 
-def indices_along(array, name, scale, shift):
+def indices_along(array, name, scale, shift, is_ours):
     """The step and the first of the indices of voxels along a dimension, whose places are index * scale + shift. Every n-th element
-    (array[::2]) and averages of n elements (array.coarsen) have steps of n; other coordinates are not those of the matrix."""
+    (array[::2]) and averages of n elements (array.coarsen) have steps of n, which only coordinates of to_xarray may have, because
+    others can be those of another matrix."""
     notes = []
     step, first, _ = step_along(array, name, notes)
     if notes:
@@ -128,7 +133,7 @@ def indices_along(array, name, scale, shift):
     count, index = step / scale, (first - shift) / scale
     precision = 1e-3 + 4e-7 * abs(first / scale)  # coordinates of float32 are as precise as this
     whole = round(count)
-    if whole == 0 or abs(count - whole) > 1e-3 * abs(count):
+    if whole == 0 or abs(count - whole) > 1e-3 * abs(count) or not (is_ours or abs(whole) == 1):
         raise contradiction(name, f"their step is {step:.6g}, and that of voxels {scale:.6g}")
     between = (abs(whole) - 1) / 2  # the middle of the elements of an average
     nearest = min((round(index), round(index - between) + between), key=lambda place: abs(index - place))
@@ -149,7 +154,9 @@ def placed_by_attribute(array):
         is_index = not is_plain(matrix) or attributes.get("long_name") == INDEX
         if is_index and "units" in attributes:
             raise contradiction(name, f"they are in {attributes['units']}, and must be indices of voxels")
-        count, first = indices_along(array, name, *((1.0, 0.0) if is_index else (matrix[axis, axis], matrix[axis, 3])))
+        scale, shift = (1.0, 0.0) if is_index else (matrix[axis, axis], matrix[axis, 3])
+        is_ours = attributes.get("long_name") == INDEX or attributes.get(VOXEL) == scale
+        count, first = indices_along(array, name, scale, shift, is_ours)
         if count < 0:
             array, count, first = turned_round(array, name, count, first)
         counts[axis] = count
@@ -226,9 +233,9 @@ def array_of(self, box=None, *, masked=True):
         attributes["transform"] = matrix.ravel().tolist()
     if matrix is not None and is_plain(matrix):
         places = [matrix[axis, axis] * place + matrix[axis, 3] for axis, place in enumerate(places)]
-        about = unit
+        abouts = [{**unit, VOXEL: float(matrix[axis, axis])} for axis in range(3)]
     else:
-        about = {"long_name": INDEX}
+        abouts = [{"long_name": INDEX}] * 3
         attributes.update({"length_unit": text for text in unit.values()})
     return xarray.DataArray(values, dims=tuple(SPACE), name=self.name, attrs=attributes, coords={
-        axis: (axis, place, about) for axis, place in zip(SPACE, places)})
+        axis: (axis, place, about) for axis, place, about in zip(SPACE, places, abouts)})
