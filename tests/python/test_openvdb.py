@@ -79,6 +79,29 @@ def test_a_frustum_comes_back():
     assert matrix(volume.to_pyopenvdb().transform) == matrix(transform)
 
 
+def test_an_array_of_xarray_does_not_lose_a_frustum_without_a_word():
+    pytest.importorskip("xarray")
+    transform = vdb.createFrustumTransform((0, 0, 0), (99, 99, 49), taper=0.5, depth=2.0, voxelSize=0.1)
+    volume = esvr.Volume.from_pyopenvdb(fog(transform))
+    with pytest.warns(UserWarning, match="is a frustum") as told:
+        array = volume.to_xarray()
+    assert told[0].filename == __file__
+    with pytest.raises(esvr.UsageError, match="indices of voxels"):
+        esvr.Volume.from_xarray(array)
+
+
+def test_warnings_name_the_line_of_the_caller():
+    transform = vdb.createFrustumTransform((0, 0, 0), (99, 99, 49), taper=0.5, depth=2.0, voxelSize=0.1)
+    grid = fog(transform)
+    grid.getAccessor().setValueOff((1, 2, 4), 7.0)
+    volume = esvr.Volume.from_pyopenvdb(grid)
+    with pytest.warns(UserWarning, match="is a frustum") as told:
+        volume.render(4, 4)
+    with pytest.warns(UserWarning, match="loses") as told_of_values:
+        esvr.fit(volume, lossless=True, device="cpu")
+    assert told[0].filename == told_of_values[0].filename == __file__
+
+
 def test_values_are_not_rounded_to_half_floats():
     grid = fog()
     grid.saveFloatAsHalf = True

@@ -120,8 +120,34 @@ def test_repr_says_shape_values_transform_and_bytes(volume, grid):
                             "active, values 0.01 to 1, voxel size 0.5, 57.3 KB of memory>")
     assert repr(grid).startswith("<esvr.Grid 'density': fog volume, 40 ellipsoids, 19 x 19 x 19 voxels from (0, 103, 10)")
     assert "values 0.01 to 1, voxel size 0.5, " in repr(grid) and repr(grid).endswith(" of a file>")
-    file = esvr.convert([volume], preset="draft", device="cpu")
-    assert repr(file).startswith("<esvr.File: 1 grid (density), ") and repr(file).endswith(" of memory>")
     turned = esvr.Volume.from_numpy(np.ones((1, 1, 1)), transform=[[0, 2, 0, 0], [-1, 0, 0, 0], [0, 0, 3, 0], [0, 0, 0, 1]])
-    assert "voxel size 1 x 2 x 3, turned or sheared" in repr(turned)
+    assert "voxel size 1 x 2 x 3, turned or sheared, 2.12 KB" in repr(turned)
+    moved = esvr.Volume.from_numpy(np.ones((1, 1, 1)), transform=[[2, 0, 0, 5], [0, 2, 0, 0], [0, 0, 2, -0.25], [0, 0, 0, 1]])
+    assert "voxel size 2, voxel (0, 0, 0) at (5, 0, -0.25), " in repr(moved)
     assert "no active voxel" in repr(esvr.Volume.from_numpy(np.zeros((1, 1, 1))))
+
+
+def test_repr_of_a_file_has_its_grids(volume):
+    """One grid is on the line of the file, and each of several has a line."""
+    of_grid = (f"'density': fog volume, stored as voxels, 19 x 19 x 19 voxels from (0, 103, 10), {volume.active_voxels} active, "
+               "values 0.01 to 1, voxel size 0.5")
+    one = repr(esvr.convert([volume], lossless=True, device="cpu"))
+    assert one.startswith("<esvr.File: 1 grid, ") and one.endswith(f" of memory: {of_grid}>")
+    ones = esvr.Volume.from_numpy(np.ones((2, 2, 2)), name="b", transform=np.diag([1, 2, 3, 1]), grid_class="unknown")
+    head, first, second = repr(esvr.convert([volume, ones], lossless=True, device="cpu")).split("\n  ")
+    assert head.startswith("<esvr.File: 2 grids, ") and first == of_grid
+    assert second == "'b': stored as voxels, 2 x 2 x 2 voxels from (0, 0, 0), 8 active, values 1 to 1, voxel size 1 x 2 x 3>"
+    many = repr(esvr.convert([ones] * 25, lossless=True, device="cpu"))
+    assert many.count("\n") == 21 and "'b[1]': " in many and many.endswith("\n  and 5 more>")
+
+
+def test_dask_knows_equal_objects(volume, grid):
+    """Otherwise, Dask would compute again what it has a result of."""
+    tokenize = pytest.importorskip("dask.base", reason="Debian: python3-dask").tokenize
+    file = esvr.convert([volume], lossless=True, device="cpu")
+    things = [volume, grid, file, grid.ellipsoids, esvr.compare(volume, grid)]
+    for thing in things:
+        assert tokenize(thing) == tokenize(again(thing)) == tokenize(copy.copy(thing))
+    assert len({tokenize(thing) for thing in things}) == len(things)
+    larger = esvr.Volume.from_numpy(volume.to_numpy(), origin=volume.box[0], voxel_size=0.6)
+    assert tokenize(larger) != tokenize(volume)

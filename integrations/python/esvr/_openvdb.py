@@ -53,7 +53,7 @@ def volume_of(grid, *, nonfinite="refuse"):
         return Volume._from_only_grid(path, nonfinite)
 
 
-def grid_of(volume):
+def grid_of(self):
     """Makes a FloatGrid of OpenVDB's Python module (Debian and Ubuntu: python3-openvdb).
 
     Name, class, background, transform, metadata, active voxels and their values are those of the volume.
@@ -61,6 +61,6 @@ def grid_of(volume):
     module = openvdb()
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "grid.vdb")
-        volume._save_as_float(path)
+        self._save_as_float(path)
         grids, _ = module.readAll(path)
         return grids[0]

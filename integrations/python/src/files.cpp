@@ -160,7 +160,7 @@ struct SavedPart {
   SavedResolution resolution{};
 
   [[nodiscard]] bool isWhole() const {
-    return !box && !layers && !maxEllipsoids && !resolution.coarsen && !resolution.voxelSize;
+    return !box && !layers && !maxEllipsoids && resolution.coarsen == 1 && !resolution.voxelSize;
   }
 };
 
@@ -228,6 +228,29 @@ std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<GridOfF
   return all;
 }
 
+/// What is written of a file.
+struct Saved {
+  Chosen chosen;
+  std::vector<Decoded> decoded;  ///< of the grids that are not carried
+};
+
+/// \throws MemoryExceeded  the grids together take too much. They are there twice more while they are written.
+void requireTogether(const EsvrFile& file, const SavedPart& part) {
+  constexpr double kCopies = 3.0;
+  const DecodeOptions options = decodeOptions(part);
+  double bytes = 0.0;
+  for (const StoredGrid& grid : file.grids)
+    bytes += kCopies * double(bytesAtResolution(grid, part.resolution.coarsen, options).result);
+  requireWithinMemory(bytes, options.maxBytes, "the grids of the file at this resolution");
+}
+
+Saved decodeAll(const EsvrFile& file, const SavedPart& part) {
+  Saved saved{choose(file, part), {}};
+  for (const GridOfFile& grid : saved.chosen.grids)
+    if (!grid.isCarried) saved.decoded.push_back(decode(file, grid, part));
+  return saved;
+}
+
 /// Writes the voxels of all grids of a file to a .vdb or .nvdb file.
 /// \return the names of the carried grids that were left out because they cannot be cut
 /// \throws UsageError  the box is empty, or a number is 0
@@ -235,12 +258,15 @@ std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<GridOfF
 std::vector<std::string> saveFile(const File& self, const std::filesystem::path& path,
                                   const SavedPart& part, bool overwrite) {
   const EsvrFile& file = *self.file;
-  Chosen chosen = choose(file, part);
-  std::vector<Decoded> decoded;
-  for (const GridOfFile& grid : chosen.grids)
-    if (!grid.isCarried) decoded.push_back(decode(file, grid, part));
-  writeGrids(path, file.metadata, inOrder(file, chosen.grids, decoded), {.overwrite = overwrite});
-  return chosen.leftOut;
+  const Saved saved = atResolution(part.resolution, [&](const SavedResolution& resolution) {
+    SavedPart chosen = part;
+    chosen.resolution = resolution;
+    if (part.resolution.isAuto) requireTogether(file, chosen);
+    return decodeAll(file, chosen);  // carried grids are left out only where voxels change
+  });
+  writeGrids(path, file.metadata, inOrder(file, saved.chosen.grids, saved.decoded),
+             {.overwrite = overwrite});
+  return saved.chosen.leftOut;
 }
 
 }  // namespace
@@ -265,12 +291,10 @@ void addFiles(py::module_& module) {
           "save",
           [](const File& file, const std::filesystem::path& path,
              const std::optional<PlainBox>& box, const std::optional<std::size_t>& layers,
-             const std::optional<std::size_t>& maxEllipsoids, std::optional<double> coarsen,
+             const std::optional<std::size_t>& maxEllipsoids, const py::object& coarsen,
              std::optional<double> voxelSize, bool overwrite) {
-            return interruptible([&] {
-              return saveFile(file, path, {box, layers, maxEllipsoids, {coarsen, voxelSize}},
-                              overwrite);
-            });
+            const SavedPart part{box, layers, maxEllipsoids, resolutionOf(coarsen, voxelSize)};
+            return interruptible([&] { return saveFile(file, path, part, overwrite); });
           },
           py::arg("path"), py::kw_only(), py::arg("box") = py::none(),
           py::arg("layers") = py::none(), py::arg("max_ellipsoids") = py::none(),

@@ -123,11 +123,21 @@ void addEllipsoids(py::module_& module) {
 
 }  // namespace
 
+SavedResolution resolutionOf(const py::object& coarsen, const std::optional<double>& voxelSize) {
+  if (voxelSize && !coarsen.is_none())
+    throw UsageError("coarsen and voxel_size exclude each other");
+  if (voxelSize && !(*voxelSize > 0.0)) throw UsageError("voxel_size must be above 0");
+  if (coarsen.is_none()) return {.voxelSize = voxelSize};
+  if (py::isinstance<py::str>(coarsen) && coarsen.cast<std::string>() == "auto")
+    return {.isAuto = true};
+  if (PyIndex_Check(coarsen.ptr()) != 0 && !py::isinstance<py::bool_>(coarsen))
+    for (const int factor : {2, 4, 8})
+      if (coarsen.equal(py::int_(factor))) return {.coarsen = factor};
+  throw UsageError("coarsen is 2, 4, 8 or 'auto', not " + py::repr(coarsen).cast<std::string>());
+}
+
 double factorOf(const Transform& transform, const SavedResolution& wish) {
-  if (wish.coarsen && wish.voxelSize) throw UsageError("coarsen and voxel_size exclude each other");
-  if (wish.coarsen && !(*wish.coarsen >= 1.0)) throw UsageError("coarsen must be 1 or above");
-  if (wish.voxelSize && !(*wish.voxelSize > 0.0)) throw UsageError("voxel_size must be above 0");
-  return wish.voxelSize ? factorFor(transform, *wish.voxelSize) : wish.coarsen.value_or(1.0);
+  return wish.voxelSize ? factorFor(transform, *wish.voxelSize) : double(wish.coarsen);
 }
 
 Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
@@ -136,8 +146,11 @@ Volume decoded(const Grid& grid, const std::optional<PlainBox>& box,
   if (box) options.box = boxOf(*box);
   if (options.box && options.box->empty()) throw UsageError("the box is empty");
   return interruptible([&] {
-    return Volume{std::make_shared<const VolumeGrid>(decodeAtResolution(
-        *grid.grid, factorOf(grid.grid->descriptor.transform, resolution), options))};
+    return atResolution(resolution, [&](const SavedResolution& chosen) {
+      const double factor = factorOf(grid.grid->descriptor.transform, chosen);
+      return Volume{
+          std::make_shared<const VolumeGrid>(decodeAtResolution(*grid.grid, factor, options))};
+    });
   });
 }
 
@@ -148,18 +161,21 @@ void addGrid(py::module_& module) {
   type.def(
           "to_volume",
           [](const Grid& grid, const std::optional<PlainBox>& box,
-             const std::optional<std::uint64_t>& maxMemory, std::optional<double> coarsen,
+             const std::optional<std::uint64_t>& maxMemory, const py::object& coarsen,
              std::optional<double> voxelSize) {
-            return decoded(grid, box, maxMemory, {coarsen, voxelSize});
+            return decoded(grid, box, maxMemory, resolutionOf(coarsen, voxelSize));
           },
           py::arg("box") = py::none(), py::kw_only(), py::arg("max_memory") = py::none(),
           py::arg("coarsen") = py::none(), py::arg("voxel_size") = py::none(),
           "Decodes the voxels, or those in a box ((x0, y0, z0), (x1, y1, z1)), both inclusive.\n"
-          "max_memory is that of esvr.read. coarsen is a factor from 1 to 1024 by which the edges "
-          "of\n"
-          "voxels become longer, each with the average of what is in it; voxel_size is the length\n"
-          "of their shortest edge instead, in units of the world, and may be shorter than in the\n"
-          "source for ellipsoids. The box is in voxels of the source.")
+          "max_memory is that of esvr.read. coarsen is 2, 4 or 8, by which the edges of voxels "
+          "become\n"
+          "longer, each with the average of what is in it, or 'auto': the least of 1, 2, 4 and 8 "
+          "with\n"
+          "which the voxels fit into max_memory. voxel_size is the length of their shortest edge\n"
+          "instead, in units of the world, and may be shorter than in the source for ellipsoids. "
+          "The\n"
+          "box is in voxels of the source.")
       .def("evaluate", &evaluate, py::arg("points"),
            "The sum of the ellipsoids at points of shape (n, 3), in index coordinates: float32 of\n"
            "shape (n,). A fit constrains it at voxels only.")
@@ -377,7 +393,7 @@ void tellLostValues(const Volume& volume) {
   const std::string text = "grid '" + shownName(volume.grid->descriptor.name) + "' loses " +
                            toText(inactive) +
                            "; the program vdb2esvr keeps them with --lossless or --keep";
-  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), kCaller) != 0) throw py::error_already_set();
 }
 
 constexpr const char* kFitText = "Converts a volume to a Grid. ";

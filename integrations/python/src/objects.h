@@ -16,6 +16,7 @@
 
 #include "esvr/container.h"
 #include "esvr/device.h"
+#include "esvr/error.h"
 #include "esvr/vdb_io.h"
 
 namespace esvr::python {
@@ -90,7 +91,7 @@ using Matrix = std::array<std::array<double, 4>, 4>;
 /// \throws UsageError  no class has the name
 [[nodiscard]] GridClass classFrom(const std::string& name);
 
-/// What repr() says of an object, in one line (properties.cpp).
+/// What repr() says of an object (properties.cpp).
 [[nodiscard]] std::string describe(const Volume& volume);
 [[nodiscard]] std::string describe(const Grid& grid);
 [[nodiscard]] std::string describe(const Packed& grid);
@@ -118,14 +119,36 @@ void addDescriptor(py::class_<T>& type) {
       .def("__repr__", [](const T& object) { return describe(object); });
 }
 
+/// The stack level of warnings: the caller of the function that explains wrong arguments (esvr/_keywords.py).
+inline constexpr py::ssize_t kCaller = 2;
+
+/// \throws MemoryExceeded  an array over the box would have more bytes than there are addresses
+void requireAddressable(const Box& box, std::size_t bytesOfElement);
+
 /// What the argument `nonfinite` says. \throws UsageError  it is neither 'refuse' nor 'keep'
 [[nodiscard]] NonFinite nonFiniteOf(const std::string& word);
 
-/// The arguments `coarsen` and `voxel_size`.
+/// The arguments `coarsen`, which is one of esvr2vdb --coarsen, and `voxel_size`.
 struct SavedResolution {
-  std::optional<double> coarsen{}, voxelSize{};
+  int coarsen = 1;
+  bool isAuto = false;  ///< the least factor with which the grids fit into the memory
+  std::optional<double> voxelSize{};
 };
-/// The factor of esvr/resolution.h. \throws UsageError  an argument is out of range, or both are given
+/// \throws UsageError  an argument is out of range, or both are given
+[[nodiscard]] SavedResolution resolutionOf(const py::object& coarsen,
+                                           const std::optional<double>& voxelSize);
+/// Decodes with a resolution. \param decode  takes a SavedResolution that is not `isAuto`, and throws MemoryExceeded
+template <class Decode>
+auto atResolution(const SavedResolution& wish, const Decode& decode) {
+  if (!wish.isAuto) return decode(wish);
+  for (const int factor : {1, 2, 4}) try {
+      return decode({.coarsen = factor});
+    } catch (const MemoryExceeded&) {
+      continue;  // coarser voxels take less
+    }
+  return decode({.coarsen = 8});
+}
+/// The factor of esvr/resolution.h. \throws UsageError  as for factorFor
 [[nodiscard]] double factorOf(const Transform& transform, const SavedResolution& wish);
 
 /// The voxels of a stored grid, with the GIL released.

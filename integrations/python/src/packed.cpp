@@ -116,12 +116,18 @@ using Int32Builder = TypedBuilder<int32_t, int8_t, uint8_t, int16_t, uint16_t, i
 using Int64Builder =
     TypedBuilder<int64_t, int8_t, uint8_t, int16_t, uint16_t, int32_t, uint32_t, int64_t>;
 
+double numberOf(const py::object& background) try {
+  return background.cast<double>();
+} catch (const py::cast_error&) {
+  throw UsageError("background must be a number, not " + py::repr(background).cast<std::string>());
+}
+
 template <class T>
 T wholeBackground(const py::object& background) {
   try {
     return py::int_(background.attr("__index__")()).cast<T>();
   } catch (const std::exception&) {
-    if (const double value = background.cast<double>();
+    if (const double value = numberOf(background);
         value == std::floor(value) && std::abs(value) < double(std::numeric_limits<T>::max()))
       return T(value);
     throw UsageError("background must be a whole number that the type of the grid holds");
@@ -136,7 +142,7 @@ std::unique_ptr<Builder> makeBuilder(const std::string& type, const py::object& 
   if (type == "int64")
     return std::make_unique<Int64Builder>(wholeBackground<int64_t>(background), rule);
   if (type == "bool") return std::make_unique<TypedBuilder<bool, bool>>(false, rule);
-  const auto number = background.cast<double>();
+  const double number = numberOf(background);
   if (!std::isfinite(type == "double" ? number : double(float(number))))
     throw UsageError("background must be finite");
   if (type == "float") return std::make_unique<FloatBuilder>(float(number), rule);
@@ -169,6 +175,7 @@ class BoxArray {
  public:
   /// \param xFastest  x is the fastest axis in memory, else z
   BoxArray(const Box& box, bool xFastest) : box_(box) {
+    requireAddressable(box, sizeof(T));
     const std::array<py::ssize_t, 3> sides{side(box.min.x, box.max.x), side(box.min.y, box.max.y),
                                            side(box.min.z, box.max.z)};
     std::vector<py::ssize_t> shape(sides.begin(), sides.end()), bytes(3);

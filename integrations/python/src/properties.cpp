@@ -37,28 +37,32 @@ bool isTriple(const py::handle& value, const Test& test) {
 
 }  // namespace
 
+namespace {
+
 /// OpenVDB has a type for each kind of value.
+MetaItem itemFrom(const std::string& name, const py::handle& value) {
+  if (py::isinstance<py::bool_>(value)) return itemOf(name, "bool", value.cast<bool>());
+  if (isInteger(value)) return itemOf(name, "int64", value.cast<std::int64_t>());
+  if (py::isinstance<py::float_>(value)) return itemOf(name, "double", value.cast<double>());
+  if (py::isinstance<py::str>(value)) return stringItem(name, value.cast<std::string>());
+  if (isTriple(value, isInteger)) return itemOf(name, "vec3i", value.cast<Corner>());
+  if (isTriple(value, isFloat)) return itemOf(name, "vec3d", value.cast<std::array<double, 3>>());
+  throw py::cast_error();
+}
+
+}  // namespace
+
 std::vector<MetaItem> itemsOf(const py::dict& metadata) {
   std::vector<MetaItem> items;
-  for (const auto& [key, value] : metadata) {
-    const auto name = key.cast<std::string>();
-    if (py::isinstance<py::bool_>(value))
-      items.push_back(itemOf(name, "bool", value.cast<bool>()));
-    else if (isInteger(value))
-      items.push_back(itemOf(name, "int64", value.cast<std::int64_t>()));
-    else if (py::isinstance<py::float_>(value))
-      items.push_back(itemOf(name, "double", value.cast<double>()));
-    else if (py::isinstance<py::str>(value))
-      items.push_back(stringItem(name, value.cast<std::string>()));
-    else if (isTriple(value, isInteger))
-      items.push_back(itemOf(name, "vec3i", value.cast<Corner>()));
-    else if (isTriple(value, isFloat))
-      items.push_back(itemOf(name, "vec3d", value.cast<std::array<double, 3>>()));
-    else
-      throw UsageError("the metadata item '" + name +
-                       "' must be a text, a number, a truth value, or a tuple of three integers or "
-                       "three floats");
-  }
+  for (const auto& [key, value] : metadata) try {
+      if (!py::isinstance<py::str>(key)) throw py::cast_error();
+      items.push_back(itemFrom(key.cast<std::string>(), value));
+    } catch (const py::cast_error&) {  // also for integers that are too large, and broken texts
+      throw UsageError(
+          "the metadata item " + py::repr(key).cast<std::string>() +
+          " must be a text, a number (integers of 64 bits), a truth value, or a tuple of "
+          "three integers of 32 bits or three floats, and its name a text");
+    }
   return items;
 }
 
@@ -124,7 +128,7 @@ GridClass classFrom(const std::string& name) {
   throw UsageError("grid_class is 'fog volume' or 'unknown', not '" + name + "'");
 }
 
-// What repr() says: shape, values, transform and bytes, in one line.
+// What repr() says: shape, values, transform and bytes, in one line for a grid.
 
 namespace {
 
@@ -161,7 +165,8 @@ std::string rangeText(float low, float high) {
   return "values " + numberText(low) + " to " + numberText(high);
 }
 
-/// "voxel size 0.5", or the sides of a voxel that is no cube, or of one that is turned or sheared.
+/// "voxel size 0.5", or the sides of a voxel that is no cube, or of one that is turned or sheared, and where voxel
+/// (0, 0, 0) is, if this is not the origin of the world.
 std::string transformText(const Transform& transform) {
   if (!transform.affine) return "a frustum";
   const auto& m = *transform.affine;  // row-major, for row vectors
@@ -173,28 +178,42 @@ std::string transformText(const Transform& transform) {
       isTurned = isTurned || (row != column && m[4 * row + column] != 0.0);
     }
   }
-  const std::string first = numberText(sides[0]), second = numberText(sides[1]),
-                    third = numberText(sides[2]);
-  const bool isCube = first == second && second == third;
-  return "voxel size " + (isCube ? first : first + " x " + second + " x " + third) +
-         (isTurned ? ", turned or sheared" : "");
+  const auto joined = [](const double* numbers, const char* between) {
+    return numberText(numbers[0]) + between + numberText(numbers[1]) + between +
+           numberText(numbers[2]);
+  };
+  const std::string first = numberText(sides[0]);
+  const bool isCube = first == numberText(sides[1]) && first == numberText(sides[2]);
+  const double* const shift = &m[12];
+  const bool isShifted = shift[0] != 0.0 || shift[1] != 0.0 || shift[2] != 0.0;
+  return "voxel size " + (isCube ? first : joined(sides.data(), " x ")) +
+         (isTurned ? ", turned or sheared" : "") +
+         (isShifted ? ", voxel (0, 0, 0) at (" + joined(shift, ", ") + ")" : "");
 }
 
-std::string titleOf(const char* type, const GridDescriptor& grid) {
-  return std::string("<esvr.") + type + " '" + shownName(grid.name) + "': " +
+/// "'density': fog volume, "
+std::string titleOf(const std::string& name, const GridDescriptor& grid) {
+  return "'" + shownName(name) + "': " +
          (grid.gridClass == GridClass::kUnknown ? ""
                                                 : std::string(className(grid.gridClass)) + ", ");
 }
 
+std::string titleOf(const char* type, const GridDescriptor& grid) {
+  return std::string("<esvr.") + type + " " + titleOf(grid.name, grid);
+}
+
 std::string activeText(std::uint64_t voxels) { return std::to_string(voxels) + " active"; }
 
-/// The names with commas between them, of which very many are left out.
+/// Of more grids, the rest is a number.
+constexpr std::size_t kMostListed = 20;
+
+/// The names with commas between them.
 std::string listOf(const std::vector<std::string>& names) {
-  constexpr std::size_t kMost = 20;
   std::string list;
-  for (std::size_t n = 0; n < std::min(names.size(), kMost); ++n)
+  for (std::size_t n = 0; n < std::min(names.size(), kMostListed); ++n)
     list += (n == 0 ? "" : ", ") + shownName(names[n]);
-  if (names.size() > kMost) list += " and " + std::to_string(names.size() - kMost) + " more";
+  if (names.size() > kMostListed)
+    list += " and " + std::to_string(names.size() - kMostListed) + " more";
   return list;
 }
 
@@ -218,15 +237,23 @@ std::string describe(const Volume& self) {
          bytesText(bytesInMemory(grid.volume)) + " of memory>";
 }
 
-std::string describe(const Grid& self) {
-  const StoredGrid& grid = *self.grid;
-  const std::size_t ellipsoids = grid.field.ellipsoidCount();
-  std::string text = titleOf("Grid", grid.descriptor);
-  text += grid.voxels ? "stored as voxels, " : std::to_string(ellipsoids) + " ellipsoids, ";
+namespace {
+
+/// Everything of a grid but its name and its bytes.
+std::string contentText(const StoredGrid& grid) {
+  std::string text = grid.voxels ? "stored as voxels, "
+                                 : std::to_string(grid.field.ellipsoidCount()) + " ellipsoids, ";
   text += shapeText(grid.activeBox) + ", " + activeText(grid.activeVoxels);
   if (!grid.activeBox.empty()) text += ", " + rangeText(grid.valueMin, grid.valueMax);
-  return text + ", " + transformText(grid.descriptor.transform) + ", " +
-         bytesText(bytesAdded(grid)) + " of a file>";
+  return text + ", " + transformText(grid.descriptor.transform);
+}
+
+}  // namespace
+
+std::string describe(const Grid& self) {
+  const StoredGrid& grid = *self.grid;
+  return titleOf("Grid", grid.descriptor) + contentText(grid) + ", " + bytesText(bytesAdded(grid)) +
+         " of a file>";
 }
 
 std::string describe(const Packed& self) {
@@ -238,17 +265,23 @@ std::string describe(const Packed& self) {
   return text + ", " + transformText(grid.descriptor.transform) + ">";
 }
 
+/// One line for one grid, and a line for each of several, of which very many are left out.
 std::string describe(const File& self) {
   const EsvrFile& file = *self.file;
   const std::vector<std::string> names = namesOfStored(file);
-  std::string text =
-      "<esvr.File: " + std::to_string(names.size()) + (names.size() == 1 ? " grid" : " grids");
-  if (!names.empty()) text += " (" + listOf(names) + ")";
   std::vector<std::string> carried;
   for (const CarriedGrid& grid : file.carried) carried.push_back(grid.name);
+  std::string text =
+      "<esvr.File: " + std::to_string(names.size()) + (names.size() == 1 ? " grid" : " grids");
   if (!carried.empty())
     text += ", " + std::to_string(carried.size()) + " carried unchanged (" + listOf(carried) + ")";
-  return text + ", " + bytesText(contentBytes(file)) + " of memory>";
+  text += ", " + bytesText(contentBytes(file)) + " of memory";
+  for (std::size_t g = 0; g < std::min(names.size(), kMostListed); ++g)
+    text += (names.size() == 1 ? ": " : "\n  ") + titleOf(names[g], file.grids[g].descriptor) +
+            contentText(file.grids[g]);
+  if (names.size() > kMostListed)
+    text += "\n  and " + std::to_string(names.size() - kMostListed) + " more";
+  return text + ">";
 }
 
 }  // namespace esvr::python

@@ -41,7 +41,7 @@ VoxelShape voxelOf(const GridDescriptor& grid) {
   const std::string text =
       "the transform of '" + grid.name +
       "' is a frustum or has no inverse, and is not applied; voxels are drawn as cubes";
-  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), kCaller) != 0) throw py::error_already_set();
   return {};
 }
 

@@ -77,6 +77,14 @@ void requireShape(const py::array& array, const Corner& origin) {
   }
 }
 
+/// The array that NumPy makes of something, with what a mask hides.
+py::array plainArray(const py::module_& numpy, const py::object& given) try {
+  return numpy.attr("asarray")(given);
+} catch (const py::error_already_set& error) {
+  if (!error.matches(PyExc_ValueError)) throw;  // lists of lists of different lengths
+  throw UsageError("NumPy makes no array of it: " + py::str(error.value()).cast<std::string>());
+}
+
 /// Converts an array to floats. Integers and elements that would become infinite must not change.
 Numbers numbersOf(const py::object& given, const Corner& origin) {
   const py::module_ numpy = py::module_::import("numpy");
@@ -84,7 +92,7 @@ Numbers numbersOf(const py::object& given, const Corner& origin) {
   Numbers numbers;
   if (py::isinstance(given, ma.attr("MaskedArray")))
     numbers.masked = FlagArray(ma.attr("getmaskarray")(given));
-  const py::array plain = py::array(numpy.attr("asarray")(given));  // with what a mask hides
+  const py::array plain = plainArray(numpy, given);
   requireNumbers(plain);
   requireShape(plain, origin);
   const py::object quiet =
@@ -251,6 +259,18 @@ Volume fromNumpy(const py::object& array, const ArrayOptions& options) {
   return {std::move(grid), rounded};
 }
 
+}  // namespace
+
+void requireAddressable(const Box& box, std::size_t bytesOfElement) {
+  const double bytes = (double(box.max.x) - box.min.x + 1.0) *
+                       (double(box.max.y) - box.min.y + 1.0) *
+                       (double(box.max.z) - box.min.z + 1.0) * double(bytesOfElement);
+  constexpr auto kMost = std::uint64_t(std::numeric_limits<py::ssize_t>::max());
+  requireWithinMemory(bytes, kMost, "an array over the box");
+}
+
+namespace {
+
 Box boxOrActive(const SparseVolume& volume, const std::optional<PlainBox>& box) {
   const Box chosen = box ? boxOf(*box) : activeBox(volume);
   if (chosen.empty())
@@ -263,6 +283,7 @@ template <class T, class ValueAt>
 py::array_t<T> arrayOver(const SparseVolume& volume, const std::optional<PlainBox>& plain,
                          T outside, const ValueAt& valueAt) {
   const Box box = boxOrActive(volume, plain);
+  requireAddressable(box, sizeof(T));
   const auto length = [&](std::int32_t low, std::int32_t high) {
     return py::ssize_t(high) - low + 1;
   };

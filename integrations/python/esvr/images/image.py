@@ -6,13 +6,13 @@ a patient) in every format that has a patient, and those of the file in all othe
 """
 import bz2
 import contextlib
+import dataclasses
 import importlib
 import math
 import os
 import re
 import tempfile
 import zlib
-from dataclasses import dataclass, field
 from typing import Callable, Optional
 
 import numpy as np
@@ -54,14 +54,14 @@ def factor(unit, to):
 
 
 # -- axes ----------------------------------------------------------------------------------------------------------
-@dataclass
+@dataclasses.dataclass
 class Axis:
     """An axis of an image: one of space ("x", "y", "z"), "channel", "time", "vector" for the components of vectors, or
     the name of another quantity."""
     kind: str
     size: int
     name: str = ""
-    labels: list = field(default_factory=list)
+    labels: list = dataclasses.field(default_factory=list)
 
     def text(self):
         shown = self.name or self.kind
@@ -263,7 +263,7 @@ def in_memory(array):
 
 
 # -- images --------------------------------------------------------------------------------------------------------
-@dataclass
+@dataclasses.dataclass
 class Image:
     """An image of a file.
 
@@ -281,9 +281,9 @@ class Image:
     scale: Optional[tuple] = None
     missing: Optional[Callable] = None
     block: int = 1  # along the slowest axis of space, so many slices are read at once
-    notes: list = field(default_factory=list)
-    warnings: list = field(default_factory=list)
-    metadata: dict = field(default_factory=dict)
+    notes: list = dataclasses.field(default_factory=list)
+    warnings: list = dataclasses.field(default_factory=list)
+    metadata: dict = dataclasses.field(default_factory=dict)
     turn: Optional[np.ndarray] = None  # 3 x 3, applied to vectors
 
     def __post_init__(self):

@@ -1,8 +1,8 @@
 """Readers of TIFF: OME-TIFF, ImageJ, SCIFIO, tifffile's own and plain stacks, in one file or a file for each slice."""
 import os
 import re
+import types
 import xml.etree.ElementTree as tree
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def read_tiff(path, options):
     axes = axes_from_letters(options.axes, series.shape, path) if options.axes else [
         Axis(TIFF_AXES.get(letter, letter.lower()), n) for letter, n in zip(letters, series.shape)]
     # What descriptions say of lengths (the step, the first place and the unit of x, y, z) and values. A step that is not known is None.
-    said = SimpleNamespace(steps=[[1.0, 0.0, None] for _ in SPACE], scale=None, labels=[], warnings=[])
+    said = types.SimpleNamespace(steps=[[1.0, 0.0, None] for _ in SPACE], scale=None, labels=[], warnings=[])
     describe(path, file, file.pages.first, said, number, options)
     if said.steps[2][0] is None:
         said.steps[2] = [said.steps[0][0], 0.0, said.steps[0][2]]
@@ -136,8 +136,8 @@ def series_of(path, file, dataset):
     if len(series) == 1:
         return first, 0
     if all(s.shape == first.shape and s.dtype == first.dtype for s in series) and not file.is_ome:
-        return SimpleNamespace(pages=[page for s in series for page in s.pages], shape=(len(series), *first.shape),
-                               axes=("Q" if "Z" in first.axes else "Z") + first.axes), 0
+        return types.SimpleNamespace(pages=[page for s in series for page in s.pages], shape=(len(series), *first.shape),
+                                     axes=("Q" if "Z" in first.axes else "Z") + first.axes), 0
     raise esvr.UsageError(f"{path} has {len(series)} images: " + ", ".join(
         f"{k} ({s.name + ', ' if s.name else ''}{' x '.join(map(str, s.shape))})" for k, s in enumerate(series[:8]))
         + "; name one by --dataset and its number")
@@ -160,7 +160,8 @@ def ome_series(path, file):
     if product(sizes.values()) != len(pages) or any(local_name(e) == "TiffData" for e in pixels):
         raise esvr.BadInput(f"{path} has {len(pages)} pages, which do not fit its OME-XML of {sizes['C']} channels of {sizes['Z']} "
                             f"slices at {sizes['T']} times")
-    return SimpleNamespace(pages=pages, shape=tuple(sizes[letter] for letter in slow_first) + pages[0].shape, axes=slow_first + "YX")
+    return types.SimpleNamespace(pages=pages, shape=tuple(sizes[letter] for letter in slow_first) + pages[0].shape,
+                                 axes=slow_first + "YX")
 
 
 def is_scifio(file):
@@ -178,7 +179,7 @@ def scifio_series(path, file):
         raise esvr.BadInput(f"{path} has {len(pages)} pages of {by(rows)} pixels, and SCIFIO's axes {said['axes']} of the lengths "
                             f"{said['lengths']}")
     letters = "".join({"z": "Z", "channel": "C", "time": "T"}.get(name, "Q") for name in names[:1:-1])
-    return SimpleNamespace(pages=pages, shape=tuple(lengths[:1:-1]) + rows, axes=letters + "YXS"[:len(rows)])
+    return types.SimpleNamespace(pages=pages, shape=tuple(lengths[:1:-1]) + rows, axes=letters + "YXS"[:len(rows)])
 
 
 def pages_of(path, file, series, page):

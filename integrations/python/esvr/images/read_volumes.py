@@ -1,4 +1,5 @@
 """Readers of NIfTI, Analyze, MRC, VTI, NumPy's and raw files."""
+# mypy: disable-error-code=import
 import math
 import os
 import re

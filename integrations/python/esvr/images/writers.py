@@ -4,6 +4,7 @@ Each takes the path of a temporary file and a Volume (vdb2image.py), whose slabs
 vectors), so that no writer needs the whole array. TYPES has the types of each format; a type that is not among them is not
 written in it.
 """
+# mypy: disable-error-code=import
 import gzip
 import io
 import math
