@@ -592,7 +592,7 @@ class SizeSearch {
 
   ConvertedFile run() {
     const double size = double(*options_.size), first = options_.previous.quality;
-    RootSearch search({kLeast, kMost, kNarrowest, kLongest}, std::log2(kAimedShare * size),
+    RootSearch search({kLeast, kMost, kNarrowest, kLongest, true}, std::log2(kAimedShare * size),
                       kOctavesPerDb, first);
     double before = 0.0;
     for (int trial = 0; !search.ended() && (trial < kMostTrials || !best_); ++trial) {

@@ -12,12 +12,15 @@ namespace esvr::encode {
 struct RootRange {
   double low = 0.0, high = 0.0;  ///< the aim is taken to lie between them
   double narrowest = 0.0;        ///< the search ends when it knows the root this well
-  /// The longest step while all trials lie on one side of the aim.
-  double longest = std::numeric_limits<double>::infinity();
+  // While all trials lie on one side of the aim:
+  double longest = std::numeric_limits<double>::infinity();  ///< step
+  /// Steps follow the slope of the last two trials. It serves where the usual slope is known badly; where trials differ
+  /// by little more than chance, as when a frame is rounded again, it costs trials.
+  bool learnsSlope = false;
 };
 
-/// Follows a slope while all trials lie on one side of the aim: a usual one at first, and then that of the last two trials.
-/// With trials on both sides, it interpolates between the nearest ones. Figures need not be quite monotone.
+/// Follows a usual slope while all trials lie on one side of the aim, and then interpolates between the nearest trials on
+/// both sides. Figures need not be quite monotone.
 class RootSearch {
  public:
   /// \param slope  usual growth of the figure with x, above 0
@@ -28,6 +31,7 @@ class RootSearch {
         next_(std::clamp(first, range.low, range.high)),
         narrowest_(range.narrowest),
         longest_(range.longest),
+        learnsSlope_(range.learnsSlope),
         low_{range.low - range.narrowest},
         high_{range.high + range.narrowest} {}
 
@@ -68,7 +72,7 @@ class RootSearch {
   /// The slope from an earlier trial to the last one, in so far as it is near the usual one.
   [[nodiscard]] double slopeFrom(const Side& before, double figure) const {
     constexpr double kMostFactor = 3.0;
-    if (!before.known() || before.x == next_) return slope_;
+    if (!learnsSlope_ || !before.known() || before.x == next_) return slope_;
     const double slope = (figure - before.figure) / (next_ - before.x);
     return std::clamp(slope, slope_ / kMostFactor, slope_ * kMostFactor);
   }
@@ -78,6 +82,7 @@ class RootSearch {
   static constexpr int kMaxRepeats = 2;      // repeated trials on a side, then steps are longer
 
   double aim_, slope_, next_, narrowest_, longest_;
+  bool learnsSlope_;
   bool wasLow_ = false;  ///< whether the last trial was below the aim
   int repeats_ = 0;      ///< number of trials directly before the last one on its side of the aim
   Side low_, high_;

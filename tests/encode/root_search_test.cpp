@@ -14,8 +14,9 @@ constexpr double kNarrowest = 0.002;
 
 /// The x at which `figure` reaches the aim, after at most `trials`.
 template <class Figure>
-double found(double aim, double first, int trials, const Figure& figure) {
-  RootSearch search({1.0, 24.0, kNarrowest}, aim, 6.0, first);
+double found(double aim, double first, int trials, const Figure& figure, bool learnsSlope = false) {
+  RootSearch search({.low = 1.0, .high = 24.0, .narrowest = kNarrowest, .learnsSlope = learnsSlope},
+                    aim, 6.0, first);
   double best = std::nan("");
   for (int n = 0; n < trials && !search.ended(); ++n) {
     const double x = search.next(), now = figure(x);
@@ -55,7 +56,7 @@ TEST(RootSearch, TakesAnInfiniteFigure) {
 
 TEST(RootSearch, FollowsTheSlopeThatTwoTrialsShow) {
   const auto flat = [](double x) { return 2.0 * x; };  // a third of the usual slope
-  EXPECT_NEAR(found(30.0, 1.0, 5, flat), 15.0, 0.5);
+  EXPECT_NEAR(found(30.0, 1.0, 5, flat, true), 15.0, 0.5);
 }
 
 TEST(RootSearch, TakesNoStepThatIsTooLong) {
