@@ -628,7 +628,7 @@ class SizeSearch {
   /// Bytes of gas_0004 double with 11 to 16 dB, those of fluid_data_0041 with 11 and those of smooth fits with 3 to 6.
   static constexpr double kOctavesPerDb = 0.1;
   /// Shares of the size that are aimed at, and that are enough. Frames vary by more than the search is worth.
-  static constexpr double kAimedShare = 0.985, kEnough = 0.96, kEnoughOfFrame = 0.88;
+  static constexpr double kAimedShare = 0.96, kEnough = 0.92, kEnoughOfFrame = 0.88;
   static constexpr double kFar = 4.0;  ///< of the size, relative to the bytes of the preset
   static constexpr int kMostTrials = 6;
 
