@@ -172,9 +172,9 @@ struct ConvertedFile {
 };
 
 /// Converts the grids of a file. The result is as deterministic as convertVolume(). A cancelled call
-/// (FitOptions::cancel, or the token of the thread) returns the grids that are complete.
+/// (FitOptions::cancel, or the token of the thread) returns the grids that are complete; none where no file was found
+/// that keeps to the size.
 /// \throws UsageError  no file of the size was found; as for convertVolume
-/// \throws Cancelled  before a file of the size was found
 /// \throws  what the sources throw, and as for convertVolume
 [[nodiscard]] ConvertedFile convertGrids(FileSource source, const FileOptions& options = {});
 
