@@ -44,8 +44,8 @@ struct VoxelLattice {
   /// Voxels whose shortest edge has a length, and whose corner at the first voxel stays where it is (transformAt in
   /// resolution.h, without its limits).
   [[nodiscard]] VoxelLattice withEdge(double size) const {
-    constexpr double kRounding =
-        1e-6;  // a size that a user types need not be a double of its multiple
+    // A size that a user types need not be a double of its multiple.
+    constexpr double kRounding = 1e-6;
     double factor = size / shortestEdge();
     if (std::abs(factor - std::round(factor)) < kRounding * factor) factor = std::round(factor);
     if (factor == 1.0) return *this;
@@ -259,8 +259,8 @@ class SplatDensity {
   const Splats& splats_;
   bool isWidened_;  ///< makeSplats() made them
   ToVoxels toVoxels_;
-  double
-      perDepth_;  ///< amplitude for a depth of 1 over the shadow in the file, times the product of the sizes
+  /// Amplitude for a depth of 1 over the shadow in the file, times the product of the sizes.
+  double perDepth_;
   std::map<Coord, std::vector<std::size_t>> order_;  ///< the splats of each chunk
 };
 

@@ -37,8 +37,8 @@ struct FitGoal {
 /// Errors at inactive voxels of the box count too, so that the PSNR over the active voxels alone is at least
 /// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {
-  double more =
-      0.0;  ///< dB above the quality of the preset; halves the bound of a surface every 6.02 dB
+  /// dB above the quality of the preset. Every 6.02 dB halve the bound of a surface.
+  double more = 0.0;
   friend auto operator<=>(const PresetGoal&, const PresetGoal&) = default;
 };
 

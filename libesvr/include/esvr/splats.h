@@ -86,8 +86,8 @@ inline constexpr std::size_t kSplatFaults = 5;
 struct SplatFile {
   SplatScene scene;
   std::uint64_t inFile = 0;  ///< splats in the file
-  std::array<std::uint64_t, kSplatFaults>
-      faulty{};  ///< those that were left out, by their SplatFault
+  /// Those that were left out, by their SplatFault.
+  std::array<std::uint64_t, kSplatFaults> faulty{};
   /// The number of all that were left out.
   [[nodiscard]] std::uint64_t dropped() const;
   /// Why they were left out: "3 with a quaternion of 0, 1 with an opacity of 0".
