@@ -577,8 +577,8 @@ std::uint64_t bytesBesideConverted(const FileSource& source, std::uint64_t size)
   throw UsageError(text + "; the size allows " + std::to_string(size));
 }
 
-/// Finds the quality that all grids of a file can have within its size. Grids that are equally good are
-/// what a viewer of all of them wants, and with a quality, they refer to each other and to the frame before.
+/// Finds the quality that all grids of a file can have within its size. Who looks at all grids wants them to be equally
+/// good, and grids with a quality refer to each other and to the frame before.
 class SizeSearch {
  public:
   SizeSearch(const FileSource& source, const FileOptions& options, GridConverter& converter,
@@ -629,7 +629,8 @@ class SizeSearch {
   static constexpr double kOctavesPerDb = 0.1;
   /// Shares of the size that are aimed at, and that are enough. Frames vary by more than the search is worth.
   static constexpr double kAimedShare = 0.96, kEnough = 0.92, kEnoughOfFrame = 0.88;
-  static constexpr double kFar = 4.0;  ///< of the size, relative to the bytes of the preset
+  static constexpr double kFar =
+      4.0;  ///< a size is far above the bytes of the preset from this factor on
   static constexpr int kMostTrials = 6;
 
   [[nodiscard]] bool mayBeExact() const {
@@ -673,8 +674,8 @@ class SizeSearch {
   const Twins& twins_;
   std::optional<ConvertedFile> best_;
   std::optional<std::uint64_t> fewest_;
-  std::vector<double> seconds_;         ///< that all conversions of each grid took
-  std::vector<double> betterAsVoxels_;  ///< from which quality on, by grids
+  std::vector<double> seconds_;         ///< time that all conversions of each grid took
+  std::vector<double> betterAsVoxels_;  ///< quality from which on each grid is better as voxels
 };
 
 /// Converts the grids to a file of at most a size.

@@ -528,7 +528,8 @@ std::string splats::faultOfToWorld(const Affine& m) {
 }
 
 std::string splats::faultOfLattice(const Affine& m) {
-  constexpr double kFlattest = 1e-9;   // of the volume of a voxel to that of a box with its edges
+  constexpr double kFlattest =
+      1e-9;  // share that a voxel has of the volume of a box with its edges
   constexpr double kSmallest = 1e-14;  // volume of a voxel; OpenVDB has no transforms below 3e-15
   if (isTooLarge(m)) return "is too large";
   double edges = 1.0;

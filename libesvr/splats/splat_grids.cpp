@@ -22,7 +22,7 @@ namespace {
 
 using namespace splats;
 
-using Affine = std::array<double, 16>;  ///< for row vectors, as Transform::affine
+using Affine = std::array<double, 16>;  ///< a map of row vectors, as Transform::affine
 
 /// The map from the index space of voxels to the world.
 struct VoxelLattice {
@@ -61,7 +61,7 @@ struct VoxelLattice {
 
 /// The map from the space of a file to voxels.
 struct ToVoxels {
-  Matrix3 linear{};  ///< of columns
+  Matrix3 linear{};  ///< a map of columns
   std::array<double, 3> shift{};
   double perUnit;      ///< units of the world for a unit of the file
   double voxelVolume;  ///< in the world
@@ -194,7 +194,7 @@ class SplatDensity {
   struct Placed {
     std::array<double, 3> place;
     PrincipalGaussian shape;
-    double integral;  ///< in voxels
+    double integral;  ///< over space in units of voxels
   };
 
   [[nodiscard]] Sizes sizesInFile(std::size_t i) const {

@@ -128,6 +128,9 @@ void keepLeaves(const Voxels& voxels, Tree& tree) {
   }
 }
 
+/// The level in a tree of a tile that has the voxels of one brick.
+constexpr openvdb::Index kTileOfABrick = 1;
+
 /// \tparam Voxels  NumberVoxels, VectorVoxels or StreamedPacked
 template <class Tree, class Voxels>
 class StreamedGrid : public openvdb::Grid<Tree> {
@@ -177,7 +180,6 @@ class StreamedGrid : public openvdb::Grid<Tree> {
     if (count == 0) return;
     const Coord c = voxels_.corner(b);
     const openvdb::Coord corner(c.x, c.y, c.z);
-    constexpr openvdb::Index kTileOfABrick = 1;  // level in the tree
     if (constantTiles && count == kBrickVoxels && isConstant(b))
       return accessor.addTile(kTileOfABrick, corner, Value(voxels_.value(b, 0, 0)), true);
     auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate{}, corner, this->background());
@@ -238,8 +240,8 @@ std::size_t nodesOf(const Voxels& voxels, int side) {
 }
 
 /// Checks the memory of a tree. Its upper nodes have 0.3 MB each of floats, and voxels that are far from each other have
-/// nodes of their own, so that a small file may ask for any amount. A small tree is like the memory of the program itself,
-/// for which no limit accounts.
+/// nodes of their own, so that a small file may ask for any amount. No limit accounts for
+/// the memory of the program itself, nor for that of a small tree.
 /// \throws MemoryExceeded
 template <class Tree, class Voxels>
 void requireRoomForTree(const Voxels& voxels, const std::string& name, std::uint64_t maxBytes) {
@@ -346,7 +348,6 @@ void mergeEqualVoxels(Tree& tree) {
                                                         [&](auto v) { return v == *values; });
     if (isEqual) equal.push_back(&*leaf);
   }
-  constexpr openvdb::Index kTileOfABrick = 1;  // level in the tree
   for (const Leaf* leaf : equal) {
     const auto value = leaf->buffer()[0];
     tree.addTile(kTileOfABrick, openvdb::Coord(leaf->origin()), value, true);

@@ -231,7 +231,7 @@ std::vector<GridToWrite> inOrder(const EsvrFile& file, const std::vector<GridOfF
 /// What is written of a file.
 struct Saved {
   Chosen chosen;
-  std::vector<Decoded> decoded;  ///< of the grids that are not carried
+  std::vector<Decoded> decoded;  ///< the grids that are not carried
 };
 
 /// \throws MemoryExceeded  the grids together take too much. They are there twice more while they are written.
