@@ -38,8 +38,9 @@ struct Unit {
   const char* name;
   double bytes;
 };
-constexpr Unit kUnits[] = {{"", 1.0},   {"b", 1.0},      {"kb", 1e3},     {"mb", 1e6},
-                           {"gb", 1e9}, {"kib", 0x1p10}, {"mib", 0x1p20}, {"gib", 0x1p30}};
+constexpr Unit kUnits[] = {{"", 1.0},       {"b", 1.0},     {"kb", 1e3},     {"mb", 1e6},
+                           {"gb", 1e9},     {"tb", 1e12},   {"kib", 0x1p10}, {"mib", 0x1p20},
+                           {"gib", 0x1p30}, {"tib", 0x1p40}};
 constexpr double kMaxBytes = 1e15;
 
 std::string lowered(std::string text) {

@@ -30,10 +30,28 @@ class MemoryBudget {
     requireWithinMemory(taken_, max_, what);
   }
 
+  /// Takes bytes for an array of voxels and what belongs to it. The array is in a file if it is large,
+  /// and also if all arrays on the heap would take more than half of the budget: many grids that are
+  /// small each may be too large together.
+  /// \param onHeap  bytes that a file saves
+  /// \param besides  bytes that are needed in any case
+  /// \return where the array is
+  /// \throws MemoryExceeded  as for take()
+  [[nodiscard]] VoxelMemory takeVoxels(std::uint64_t arrayBytes, double onHeap, double besides,
+                                       const std::string& what) {
+    const bool areTooMany = onHeap_ + onHeap > 0.5 * double(max_);
+    VoxelMemory memory = areTooMany ? voxels_.forAllSizes() : voxels_;
+    const double taken = memory.isInFile(arrayBytes) ? 0.0 : onHeap;
+    onHeap_ += taken;
+    take(besides + taken, what);
+    return memory;
+  }
+
  private:
   std::uint64_t max_;
   VoxelMemory voxels_;
   double taken_ = 0.0;
+  double onHeap_ = 0.0;  ///< the part of it for voxels
 };
 
 }  // namespace esvr

@@ -109,7 +109,13 @@ void VoxelFiles::watch() {
 VoxelMemory::VoxelMemory(const Files& files) : files_(std::make_shared<VoxelFiles>(files)) {}
 
 bool VoxelMemory::isInFile(std::uint64_t bytes) const {
-  return files_ && bytes > files_->options().maxHeapBytes;
+  return files_ && bytes > (isForAllSizes_ ? 0 : files_->options().maxHeapBytes);
+}
+
+VoxelMemory VoxelMemory::forAllSizes() const {
+  VoxelMemory memory = *this;
+  memory.isForAllSizes_ = true;
+  return memory;
 }
 
 void VoxelMemory::requireRoom(double bytes, const std::string& what) const {

@@ -115,6 +115,8 @@ VoxelMemory::VoxelMemory(const Files&) {
 
 bool VoxelMemory::isInFile(std::uint64_t) const { return false; }
 
+VoxelMemory VoxelMemory::forAllSizes() const { return *this; }
+
 void* VoxelMemory::allocate(std::size_t bytes) const { return ::operator new(bytes); }
 
 void VoxelMemory::deallocate(void* array, std::size_t) const noexcept { ::operator delete(array); }

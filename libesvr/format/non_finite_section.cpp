@@ -176,8 +176,10 @@ void getNonFinite(SectionReader& sections, std::uint32_t g, const EsvrFile* prev
     if (!previous || g >= previous->grids.size() || !previous->grids[g].nonFiniteVoxels)
       throw BadInput(where + ": there is no frame before that has such voxels");
     const VoxelLayer& layer = *previous->grids[g].nonFiniteVoxels;
-    takeBricks(layer.bricks.size(), where, sections.budget());
+    const VoxelMemory memory = takeBricks(layer.bricks.size(), where, sections.budget());
     grid.nonFiniteVoxels = layer;
+    grid.nonFiniteVoxels->codes =
+        VoxelArray<std::int32_t>(layer.codes.begin(), layer.codes.end(), memory);
   }
   if (const auto fault = nonFiniteFaultOf(grid)) throw BadInput(where + ": " + fault->text);
 }

@@ -81,9 +81,9 @@ std::vector<std::byte> SectionReader::get(const SectionId& id) {
 VoxelArray<std::byte> SectionReader::getCarried(const SectionId& id) {
   const std::size_t taken = take(id);
   const std::uint64_t bytes = table_.entries[taken].rawBytes;
-  if (!budget_.voxels().isInFile(bytes))
-    budget_.take(double(bytes), placeOf(source_.name(), table_, taken));
-  return readCarried(source_, table_, taken, budget_.voxels());
+  const VoxelMemory memory =
+      budget_.takeVoxels(bytes, double(bytes), 0.0, placeOf(source_.name(), table_, taken));
+  return readCarried(source_, table_, taken, memory);
 }
 
 void SectionReader::check(const SectionId& id) { checkStored(source_, table_, take(id)); }

@@ -126,11 +126,6 @@ constexpr std::uint64_t kCodeBytesPerBrick = kBrickVoxels * sizeof(std::int32_t)
 constexpr double kVoxelBytesPerBrick = double(kCodeBytesPerBrick) + kBrickVoxels * sizeof(float);
 constexpr double kEntryBytesPerBrick = 3.0 * sizeof(BrickMask) + 64.0;
 
-double decodedBytesPerBrick(std::uint64_t bricks, const VoxelMemory& memory) {
-  return kEntryBytesPerBrick +
-         (memory.isInFile(bricks * kCodeBytesPerBrick) ? 0.0 : kVoxelBytesPerBrick);
-}
-
 int bitsOf(const std::vector<Coord>& bricks) {
   std::uint32_t all = 0;
   for (const Coord b : bricks) all |= std::uint32_t(b.x) | std::uint32_t(b.y) | std::uint32_t(b.z);
@@ -317,8 +312,9 @@ std::uint64_t checksumOf(const VoxelLayer& layer) {
 
 }  // namespace
 
-void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
-  budget.take(double(bricks) * decodedBytesPerBrick(bricks, budget.voxels()), where);
+VoxelMemory takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget) {
+  return budget.takeVoxels(bricks * kCodeBytesPerBrick, double(bricks) * kVoxelBytesPerBrick,
+                           double(bricks) * kEntryBytesPerBrick, where);
 }
 
 std::vector<std::byte> putVoxels(const VoxelLayer& layer) {
@@ -338,9 +334,8 @@ VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& wher
   ByteReader in(content, where);
   VoxelLayer layer;
   codeHead(in, layer);
-  layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   const BrickCount count = getBrickCount(in, content.size());
-  takeBricks(count.bricks, where, budget);
+  layer.codes = VoxelArray<std::int32_t>(takeBricks(count.bricks, where, budget));
   codec::VoxelModel model;
   codeModel(in, model);
   decodeStreams(in, count, model, layer);
@@ -386,7 +381,8 @@ void decodePredicted(ByteReader& in, const codec::PastVoxels& past, std::uint64_
   codec::codeFrameBricks(reader, past, maxBricksIn(stream.size()), layer.bricks);
   if (layer.bricks.size() > maxBricks) in.fail("more bricks of voxels than its bytes can hold");
   checkBricks(layer, in);
-  takeBricks(layer.bricks.size(), place.where, place.budget);
+  layer.codes =
+      VoxelArray<std::int32_t>(takeBricks(layer.bricks.size(), place.where, place.budget));
   layer.codes.resize(layer.bricks.size() * kBrickVoxels);
   layer.active.resize(layer.bricks.size());
   layer.vacant.resize(layer.bricks.size());
@@ -450,7 +446,6 @@ StoredGrid getPredicted(std::span<const std::byte> content, const std::string& w
   ByteReader in(content, where);
   StoredGrid grid = getRecordAfter(in, previous, where);
   VoxelLayer layer = getHead(in, *previous.voxels);
-  layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   if (!codec::isPredictable(layer, *previous.voxels))
     in.fail("lies too far from the previous frame");
   try {
@@ -601,7 +596,6 @@ void getRelated(std::span<const std::byte> content, const std::string& where,
   const VoxelReference reference = getReference(in);
   const VoxelLayer* of = referencedLayer(reference, before, in);
   VoxelLayer layer = getRelatedHead(in, of);
-  layer.codes = VoxelArray<std::int32_t>(budget.voxels());
   const VoxelLayer empty = emptyAt(layer);
   const VoxelLayer& context = of ? *of : empty;
   if (!codec::isPredictable(layer, context)) in.fail("lies too far from the grid it refers to");

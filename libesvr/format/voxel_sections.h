@@ -58,8 +58,9 @@ std::uint64_t keepCoded(VoxelLayer& layer);
 [[nodiscard]] VoxelLayer getVoxels(std::span<const std::byte> content, const std::string& where,
                                    MemoryBudget& budget);
 
-/// Takes the memory of bricks while they are read from a budget.
-void takeBricks(std::uint64_t bricks, const std::string& where, MemoryBudget& budget);
+/// Takes the memory of bricks while they are read from a budget. \return where their codes are
+[[nodiscard]] VoxelMemory takeBricks(std::uint64_t bricks, const std::string& where,
+                                     MemoryBudget& budget);
 
 // ---- A grid of voxels as its difference from the same grid of the previous frame
 

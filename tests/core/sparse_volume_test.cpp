@@ -578,6 +578,8 @@ TEST(VoxelMemory, IsAFileAboveTheLimitOnly) {
   const VoxelMemory memory = filesIn(folder.path());
   EXPECT_FALSE(memory.isInFile(1024));
   EXPECT_TRUE(memory.isInFile(1025));
+  EXPECT_TRUE(memory.forAllSizes().isInFile(1));
+  EXPECT_FALSE(VoxelMemory().forAllSizes().isInFile(1));
 }
 
 TEST(VoxelMemory, OfAFileHoldsWhatIsWrittenAndGrows) {

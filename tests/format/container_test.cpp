@@ -16,6 +16,7 @@
 #include "esvr/container.h"
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
+#include "fit/volumes.h"
 #include "format/sample_files.h"
 #include "support/files.h"
 #include "support/messages.h"
@@ -432,6 +433,31 @@ TEST_F(ContainerFile, OfCarriedGridsLargerThanTheMemoryIsRefusedOrReadIntoAFile)
   EXPECT_EQ(read.carried, file.carried);
   writeEsvr(folder_ / "again.esvr", read);
   EXPECT_EQ(readEsvr(folder_ / "again.esvr").carried, file.carried);
+}
+
+TEST_F(ContainerFile, OfVoxelsThatAreTooManyTogetherIsRefusedOrReadIntoFiles) {
+  constexpr int kGrids = 6;
+  EsvrFile file;
+  for (int g = 0; g < kGrids; ++g) {
+    const SparseVolume volume =
+        fullBricks({{0, 0, 0}, {0, 0, 8}}, 0.0f, [&](Coord at) { return float(g + at.x); });
+    file.grids.push_back(makeStoredVoxels({}, volume, exactLayer(volume)));
+    file.grids.back().descriptor.name = "grid" + std::to_string(g);
+  }
+  writeEsvr(path(), file);
+  // Codes and values of two bricks take 8 KB, so that no grid is too large by itself.
+  constexpr std::uint64_t kTooLittle = 60'000, kForNone = 2'000;
+  EXPECT_THROW((void)readEsvr(path(), {.maxBytes = kTooLittle}), MemoryExceeded);
+  const VoxelMemory files({.folder = folder_ / ".", .maxHeapBytes = kTooLittle / 4});
+  const EsvrFile read = readEsvr(path(), {.maxBytes = kTooLittle, .memory = files});
+  EXPECT_EQ(difference(read, file), "");
+  const auto isInFile = [](const StoredGrid& grid) {
+    const auto& codes = grid.voxels->codes;
+    return codes.get_allocator().memory().isInFile(codes.size() * sizeof(codes[0]));
+  };
+  EXPECT_FALSE(isInFile(read.grids.front()));
+  EXPECT_TRUE(isInFile(read.grids.back()));
+  EXPECT_THROW((void)readEsvr(path(), {.maxBytes = kForNone, .memory = files}), MemoryExceeded);
 }
 
 TEST_F(ContainerFile, SlowOfSeveralBloscBuffersComesBack) {

@@ -73,6 +73,7 @@ TEST(ByteSize, knowsUnits) {
   EXPECT_EQ(parseByteSize("size", "2.6MB"), 2'600'000u);
   EXPECT_EQ(parseByteSize("size", "48kib"), 49'152u);
   EXPECT_EQ(parseByteSize("size", "1GiB"), std::uint64_t{1} << 30);
+  EXPECT_EQ(parseByteSize("size", "1.5TB"), 1'500'000'000'000u);
   EXPECT_EQ(parseByteSize("size", "7b"), 7u);
 }
 

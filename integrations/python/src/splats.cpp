@@ -105,15 +105,17 @@ void addSplats(py::module_& module) {
       "axis of the world that points upwards, or None for a file with the axes of the world; kind "
       "is\n"
       "'viewer' or 'mitsuba'. Returns the density scale.");
-  module.def("read_splats", &readSplatsAsGrids, py::arg("path"), py::kw_only(),
-             py::arg("voxel_size") = py::none(), py::arg("density_scale") = py::none(),
-             py::arg("up") = "y", py::arg("max_memory") = py::none(),
-             "Evaluates the splats of a .ply file at voxels.\n\n"
-             "Returns the density (esvr.Volume) and, if the splats have colors, the red, green and "
-             "blue of\n"
-             "their mean color, else None. voxel_size is 1/256 of the longest side by default; "
-             "max_memory is\n"
-             "that of esvr.read.");
+  module.def(
+      "read_splats", &readSplatsAsGrids, py::arg("path"), py::kw_only(),
+      py::arg("voxel_size") = py::none(), py::arg("density_scale") = py::none(),
+      py::arg("up") = "y", py::arg("max_memory") = py::none(),
+      "Evaluates the splats of a .ply file at voxels.\n\n"
+      "Returns the density (esvr.Volume) and, if the splats have colors, the red, green and "
+      "blue of\n"
+      "their mean color, else None. voxel_size is by default that of the grid that the splats "
+      "were made\n"
+      "of, if the file says it, and else 1/256 of the longest side; max_memory is that of "
+      "esvr.read.");
 }
 
 }  // namespace esvr::python

@@ -79,7 +79,7 @@ void requireMemory(const FitTarget& target, std::size_t ellipsoids,
                     megabytes(need) + " on the GPU, and " + megabytes(have) +
                     (maxBytes ? " are allowed" : " are free") +
                     (would > 0 ? "; " + std::to_string(would) + " ellipsoids would fit"
-                               : "; the bricks alone do not fit: use the device cpu"));
+                               : "; the bricks alone do not fit; the CPU can fit them"));
 }
 
 std::size_t affordableEllipsoids(const FitTarget& target, std::size_t wanted,

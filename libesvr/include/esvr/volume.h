@@ -105,6 +105,9 @@ class VoxelMemory {
   /// \return whether an array of this size is in a file
   [[nodiscard]] bool isInFile(std::uint64_t bytes) const;
 
+  /// The same files for arrays of any size; the heap, if there are no files.
+  [[nodiscard]] VoxelMemory forAllSizes() const;
+
   /// Checks that the disk of the files has this many bytes free. The heap is not checked.
   /// \param what  subject of the message, for example "grid 'density'"
   /// \throws MemoryExceeded  it has fewer; the text names the folder and gives both numbers
@@ -119,6 +122,7 @@ class VoxelMemory {
 
  private:
   std::shared_ptr<VoxelFiles> files_;  ///< null: always the heap
+  bool isForAllSizes_ = false;         ///< arrays below maxHeapBytes are in files, too
 };
 
 /// The allocator of arrays of voxels. A copy of an array is in the same kind of memory.
