@@ -611,13 +611,13 @@ PackedGrid readOpenVdbPacked(InputFile& file, std::size_t place, const ReadOptio
 std::vector<CarriedGrid> readOpenVdbCarried(InputFile& file, std::span<const std::size_t> places,
                                             const ReadOptions& options) {
   Archive archive(file, options.directory);
-  MemoryBudget budget(options.maxBytes, options.memory);
+  MemoryBudget budget(options.maxBytes);
   std::vector<CarriedGrid> grids;
   for (const std::size_t place : places)
     inGrid(archive.entries().at(place).name(), [&] {
       const std::uint64_t bytes = archive.treeOwner(archive.entries()[place]).gridBytes;
-      grids.push_back(carry(archive, place,
-                            budget.takeVoxels(bytes, double(bytes), 0.0, "carrying it unchanged")));
+      budget.take(options.memory.isInFile(bytes) ? 0.0 : double(bytes), "carrying it unchanged");
+      grids.push_back(carry(archive, place, options.memory));
     });
   return grids;
 }
