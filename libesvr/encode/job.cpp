@@ -99,7 +99,7 @@ Plan planOf(const Job& job) {
                least = std::min(effortFactor(effort), 1.0);
   const double usual = std::min(wanted, most * affordable);
   Plan plan;
-  plan.fitsInTime = effort > kLeastEffort && usual >= shortest;
+  plan.fitsInTime = usual >= shortest;
   plan.wholeIterations = std::uint32_t(std::ceil(std::max({least * usual, shortest, 1.0})));
   plan.shortIterations =
       std::min(plan.wholeIterations,

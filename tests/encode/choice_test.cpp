@@ -121,6 +121,28 @@ TEST(ChoiceForAPsnr, SlowOfEllipsoidsAloneTakesAFew) {
   EXPECT_LT(conversion.grid.field.ellipsoidCount(), 200u);
 }
 
+/// At the least effort, a fit is tried where voxels take few bits, for a quality and for a size.
+TEST(ChoiceAtTheLeastEffort, FitsWhatIsSmoothAlone) {
+  ConvertOptions options;
+  options.effort = kLeastEffort;
+  const SparseVolume smooth = ballVolume(), noise = test::noiseVolume(2);
+  for (const Goal& goal : {Goal{PsnrGoal{40.0}}, Goal{SizeGoal{1500}}}) {
+    options.goal = goal;
+    const Conversion conversion = convertVolume({{}, smooth}, options);
+    EXPECT_FALSE(conversion.grid.voxels);
+    EXPECT_FALSE(conversion.fitsTookTooLong);
+  }
+  for (const Goal& goal : {Goal{PsnrGoal{40.0}}, Goal{SizeGoal{3000}}}) {
+    options.goal = goal;
+    const Conversion conversion = convertVolume({{}, noise}, options);
+    EXPECT_TRUE(conversion.grid.voxels);
+    EXPECT_TRUE(conversion.fitsTookTooLong);
+    EXPECT_FALSE(conversion.choice && conversion.choice->ellipsoids);
+  }
+  options.representation = Representation::kVoxels;
+  EXPECT_FALSE(convertVolume({{}, smooth}, options).fitsTookTooLong) << "none was asked for";
+}
+
 TEST(ChoiceForASize, TakesVoxelsOfNoise) {
   const SparseVolume volume = test::noiseVolume(2);
   const Conversion conversion = choose(volume, SizeGoal{3000});

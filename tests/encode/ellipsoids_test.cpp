@@ -186,9 +186,8 @@ TEST(Plan, GivesLessTimeToLargeVolumesOfACpuAndToLittleEffort) {
     options.effort = effort;
     return encode::planOf({{descriptor, source}, options});
   };
-  EXPECT_FALSE(planFor(volume, kLeastEffort).fitsInTime);
   std::uint32_t before = 0;
-  for (int effort = kLeastEffort + 1; effort <= kUsualEffort; ++effort) {
+  for (int effort = kLeastEffort; effort <= kUsualEffort; ++effort) {
     const encode::Plan plan = planFor(volume, effort);
     EXPECT_GT(plan.wholeIterations, before);
     EXPECT_LE(plan.shortIterations, plan.wholeIterations);

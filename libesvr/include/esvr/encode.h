@@ -149,11 +149,12 @@ struct CompactRecord {
 
 struct ConvertOptions {
   Goal goal;
-  /// How long a conversion may take, from kLeastEffort to kMostEffort. The least one makes no fits, so that voxels are
-  /// stored unless ellipsoids are wanted. A step below kUsualEffort halves the iterations of fits. On the CPU, the
-  /// fits of large volumes have fewer iterations than those of small ones, and none where too few remain
-  /// (Conversion::fitsTookTooLong); a step above kUsualEffort makes these half as long again, up to those of small
-  /// volumes. A FitGoal has as many iterations more or fewer.
+  /// How long a conversion may take, from kLeastEffort to kMostEffort. A step below kUsualEffort divides the iterations
+  /// of fits by 1.6. The least effort fits only what is smooth: where voxels of the quality take less than 1.25 bits for
+  /// each active voxel, or the size is less than 2 bits. On the CPU, the fits of large volumes have fewer iterations than
+  /// those of small ones, and none where too few remain; a step above kUsualEffort makes these half as long again, up to
+  /// those of small volumes. Conversion::fitsTookTooLong says whether none was made. A FitGoal has as many iterations
+  /// more or fewer.
   int effort = kUsualEffort;
   Representation representation = Representation::kAuto;
   Measure measure = Measure::kAuto;
