@@ -29,8 +29,8 @@ import record
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # The cases, and the modules that have the functions of these names. Only what is used is imported, because some need NumPy.
-CASES = {**{name: "cases" for name in ("formats", "counts", "drawing", "paper", "resolution", "chunks", "speed", "search", "seen",
-                                       "coarser", "missing")},
+CASES = {**{name: "cases" for name in ("formats", "counts", "drawing", "paper", "resolution", "chunks", "speed", "sizes",
+                                       "search", "seen", "coarser", "missing")},
          "calibration": "calibration", "splats": "splats", "stability": "stability"}
 PAGES = ("calibration", "stability")
 # Volumes that esvr-sample makes: its options. ESVR was not tuned with those of seed 77; the last five are the paper's.

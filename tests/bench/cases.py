@@ -1,12 +1,13 @@
 """The cases that measure rows for tables of the documents beyond the record. Each of them yields its points: a key, and a
 function that measures the rows of the point.
 """
+import csv
 import math
 import statistics
 from functools import partial
 
 import rivals
-from bench import SAMPLES, call
+from bench import ROOT, SAMPLES, call
 
 VOLUMES = ["aneurism", "smoke1", "wdas_cloud_sixteenth", "hydrogen_atom", "dragon_with_xform", "cube_levelset",
            "neuron_rp140212", "neuron_m207"]
@@ -189,6 +190,30 @@ def speed_summary(rows):
                 yield {"against": rival, "effort": effort, "volumes": len(pairs),
                        "times the seconds": statistics.median(a["seconds"] / max(b["seconds"], 0.01) for a, b in pairs),
                        "times their bytes": statistics.median(b["bytes"] / a["bytes"] for a, b in pairs)}
+
+
+def sizes(bench):
+    """The least and the usual effort in the bytes of SPERR: PSNR over the active voxels, and user CPU seconds
+    (docs/figures/speed.md). The figures of SPERR are those of docs/figures/external_points.csv.
+    """
+    names = {"wdas": "wdas_cloud_sixteenth", "dragon": "dragon_with_xform"}
+
+    def row(point, name):
+        made = {"volume": name, "bytes": int(point["bytes"]), "SPERR": float(point["psnr_nonzero_db"])}
+        for effort in EFFORTS[:2]:
+            report, process = bench.report("vdb2esvr", bench.volume(name), bench.out / "sizes.esvr", *bench.box(name), "--size",
+                                           point["bytes"], "--measure", "values", "--effort", effort, "--threads", 2,
+                                           "--device", "cpu")
+            grid = report["grids"][0]
+            made |= {f"effort {effort}": grid["metrics"]["psnr_active"], f"stored, {effort}": grid["representation"]["stored"],
+                     f"seconds, {effort}": process.user_seconds}
+        return [made]
+
+    points = csv.DictReader((ROOT / "docs/figures/external_points.csv").open())
+    for point in points:
+        name = names.get(point["dataset"], point["dataset"])
+        if point["method"].startswith("SPERR") and name in bench.chosen(SPEED):
+            yield (name, point["bytes"]), partial(row, point, name)
 
 
 def search(bench):
