@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "encode/signs.h"
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
@@ -209,6 +210,13 @@ constexpr std::uint32_t kMostIterationsOfAverages = 1000;
 /// up.
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
+/// Of the residual of the signs of a narrow band (Lab, "Signs of a size"): the largest share of a size with which ellipsoids are
+/// of use, its bytes with a whole fit relative to those with a short one, the growth for which a fit that follows one without
+/// enough room for it allows, the share of a size that is used well, how often the bytes are divided, and the loss by rounding,
+/// dB, below which a first fit was left so much room that another one has more ellipsoids.
+constexpr double kMostOfSigns = 0.5, kSignsOfWholeFit = 0.75, kMoreSigns = 0.2,
+                 kLeastShareWithSigns = 0.97, kSpareLoss = 0.35;
+constexpr int kMostDivisions = 3;
 /// Limits of the loss by rounding for a judge, dB over the box.
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
@@ -220,6 +228,11 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 // Of twelve first fits that were 1.9 to 3.1 dB above their PSNR, those up to 2.3 dB were rounded to fewer bytes than a
 // second fit took, or to at most 6 % more, and those above 2.8 dB to 7 to 38 % more.
 Margin compactMargin(double usualLoss) { return {usualLoss, 0.39 * usualLoss, 2.5 * usualLoss}; }
+
+/// The bytes that sections of ellipsoids may take besides those that rate control counts.
+std::uint64_t paddingOf(const CompactResult& made) {
+  return made.grid.field.chunks.size() * (format::kAlignment - 1);
+}
 
 double countOf(const Attempt& a) { return double(std::max<std::size_t>(a.count(), 1)); }
 
@@ -348,10 +361,12 @@ Attempt EllipsoidSearch::shortFit(double count) const {
 const Attempt* EllipsoidSearch::startFor(double count) const {
   const Attempt* start = nullptr;
   const auto distance = [&](const Attempt& a) { return std::abs(std::log(countOf(a) / count)); };
+  // Ellipsoids that are left where others were dropped have more wrong signs than those from seeds.
+  const double least = signs_ > 0 ? 1.0 : kLeastGrowth;
   const auto consider = [&](const Attempt& a) {
     const double growth = count / countOf(a);
     // What filled the memory of a GPU would have no room to begin with.
-    if (a.cancelled() || a.fit.deviceFull || growth < kLeastGrowth || growth > kMostGrowth) return;
+    if (a.cancelled() || a.fit.deviceFull || growth < least || growth > kMostGrowth) return;
     if (!start || distance(a) <= distance(*start)) start = &a;
   };
   // Where many voxels saturate, a continued fit is worse (dragon: 46.8 dB instead of 48.1).
@@ -657,11 +672,13 @@ void EllipsoidSearch::forecast() {
     price_ = double(bytesOfEllipsoids(*before_)) / double(before_->field.ellipsoidCount());
   } else {
     const bool isQuick = goal_.psnr.has_value();
-    const CompactResult compact =
+    CompactResult compact =
         compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
     price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kShortFitPrice;
-    const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
-    besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
+    addSigns(compact);
+    besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + paddingOf(compact) - signs_;
+    signs_ = std::uint64_t(kSignsOfWholeFit * double(signs_));
+    besides_ += signs_;
   }
   const double bytes =
       goal_.psnr ? price_ * countFor(drafted_, aim() - behind(), slope_) : double(*goal_.bytes);
@@ -805,21 +822,54 @@ Conversion EllipsoidSearch::smallestOrBest() {
   return std::move(*smallest);
 }
 
+/// A grid with the residual of its signs, if it is a narrow band of a size, where these take room that ellipsoids lack.
+void EllipsoidSearch::addSigns(CompactResult& made) {
+  if (!options_.fit.narrowBand || !goal_.bytes) return;
+  const std::uint64_t without = bytesOfEllipsoids(made.grid);
+  made.grid = completedWithSigns(std::move(made.grid), job_.input.source);
+  signs_ = bytesOfEllipsoids(made.grid) - without;
+}
+
+/// False if what is beside the ellipsoids leaves them too few bytes.
+bool EllipsoidSearch::hasRoom() const {
+  return besides_ < *goal_.bytes && double(signs_) <= kMostOfSigns * double(*goal_.bytes);
+}
+
 /// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger than those of the attempt
 /// before; the bytes are then divided again.
-/// \return nothing if the other sections take all bytes
+/// \return nothing if the other sections take too many bytes
 std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
+  if (signs_ > 0) return filledWithSigns(attempt);
   for (int n = 0;; ++n) {
-    if (besides_ >= *goal_.bytes) return std::nullopt;
+    if (!hasRoom()) return std::nullopt;
     CompactResult now = compacted(attempt, {.bytes = *goal_.bytes - besides_});
-    const std::uint64_t padding = now.grid.field.chunks.size() * (format::kAlignment - 1);
-    const std::uint64_t besides = bytesOfEllipsoids(now.grid) - now.bytes + padding;
-    if (n > 0 || besides <= besides_ + padding) {
-      needed_ = besides_ + now.bytes;
-      return now;
-    }
+    addSigns(now);
+    needed_ = bytesOfEllipsoids(now.grid);
+    const std::uint64_t besides = needed_ - now.bytes + paddingOf(now);
+    if (n > 0 || besides <= besides_ + paddingOf(now)) return now;
     besides_ = besides;
   }
+}
+
+/// The same for a narrow band. The bytes of its signs differ from what they were with other steps, so that they are divided
+/// again until the size is used well. A result that is too large needs another fit, since coarser steps have more wrong signs.
+std::optional<CompactResult> EllipsoidSearch::filledWithSigns(const Attempt& attempt) {
+  std::optional<CompactResult> best;
+  const std::uint64_t size = *goal_.bytes;
+  for (int n = 0; n < kMostDivisions && hasRoom(); ++n) {
+    const std::uint64_t room = besides_;
+    CompactResult now = compacted(attempt, {.bytes = size - room});
+    addSigns(now);
+    const std::uint64_t needed = bytesOfEllipsoids(now.grid);
+    const bool isOver = needed > size;
+    if (isOver && best) break;
+    needed_ = needed;
+    besides_ = needed - now.bytes + paddingOf(now);
+    best = std::move(now);
+    if (isOver) besides_ += std::uint64_t(kMoreSigns * double(signs_));
+    if (isOver || double(needed) >= kLeastShareWithSigns * double(size)) break;
+  }
+  return best;
 }
 
 /// As many ellipsoids as the size allows. Where they take more bytes than expected, or would lose too
@@ -831,7 +881,7 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
     best = conversionOf(std::move(attempt.fit), std::move(now));
   };
   for (int fits = 0; fits < (best ? plan_.wholeFits : kFitsUntilOneIsSmall); ++fits) {
-    if (draft_->cancelled() || besides_ >= *goal_.bytes) break;
+    if (draft_->cancelled() || !hasRoom()) break;
     const double count = double(*goal_.bytes - besides_) / each;
     auto attempt = unlessCancelled([&]() -> std::optional<Attempt> { return wholeFit(count); });
     if (!attempt) {
@@ -841,12 +891,15 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
     auto now = filled(*attempt);
     if (!now) break;
     const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= rounding_.mostLoss;
-    const bool isLast = attempt->cancelled() || (isSmall && isGood) || attempt->asked == 1;
+    // The first fit may have been left more room for its signs than it needs.
+    const bool isSpare = fits == 0 && signs_ > 0 && now->loss < kSpareLoss;
+    const bool isLast =
+        attempt->cancelled() || (isSmall && isGood && !isSpare) || attempt->asked == 1;
     if (!isLast)
       each = std::max(
           double(compacted(*attempt, {.loss = rounding_.usualLoss, .layerErrors = false}).bytes) /
               countOf(*attempt),
-          kMoreEach * each);
+          signs_ > 0 ? 0.0 : kMoreEach * each);
     attempts_.assign(1, *attempt);  // the next fit may continue it
     if (isSmall) {
       const double reached = completed(*attempt, *now);

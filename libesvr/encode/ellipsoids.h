@@ -142,7 +142,10 @@ class EllipsoidSearch {
   [[nodiscard]] int mostWholeFits() const;
   [[nodiscard]] std::optional<Conversion> runToPsnr();
   [[nodiscard]] std::optional<Conversion> runToSize();
+  void addSigns(CompactResult& made);
+  [[nodiscard]] bool hasRoom() const;
   [[nodiscard]] std::optional<CompactResult> filled(const Attempt& attempt);
+  [[nodiscard]] std::optional<CompactResult> filledWithSigns(const Attempt& attempt);
   [[nodiscard]] Conversion smallestOrBest();
 
   ConvertOptions options_;
@@ -163,6 +166,7 @@ class EllipsoidSearch {
   std::vector<FitPoint> drafted_;   ///< all of them that are like it
   double price_ = kUsualBytesEach;  ///< expected bytes of an ellipsoid
   std::uint64_t besides_ = 0;       ///< bytes of the grid's other sections
+  std::uint64_t signs_ = 0;         ///< those of the residual of signs among them
   std::uint64_t expectedBytes_ = 0, needed_ = 0;
   std::vector<Attempt> attempts_;
   std::optional<double>

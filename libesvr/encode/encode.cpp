@@ -152,10 +152,16 @@ class Choice {
   bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
 
   UsageError tooSmall(std::uint64_t needed) const {
+    const std::string grid = "grid '" + shownName(job_.input.descriptor.name) + "'";
+    if (job_.options.fit.narrowBand && wanted_ != Representation::kVoxels)
+      return UsageError(grid +
+                        ": ellipsoids and the residual that corrects the signs of the level set do "
+                        "not fit into " +
+                        std::to_string(*goal_.bytes) + " bytes" +
+                        (wanted_ == Representation::kAuto ? ", and voxels neither" : ""));
     const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
                                          : "has no voxels of that size";
-    return UsageError("grid '" + shownName(job_.input.descriptor.name) + "' " + takes +
-                      "; the size allows " + std::to_string(*goal_.bytes));
+    return UsageError(grid + " " + takes + "; the size allows " + std::to_string(*goal_.bytes));
   }
 
   Conversion ellipsoidsAlone() {
