@@ -222,7 +222,7 @@ class FileConversion {
     listVectors(made, record);
     listCarried(made, record);
     record.interrupted = made.interrupted;
-    record.quality = made.quality;
+    record.abovePreset = made.abovePreset;
     if (record.interrupted && (!options_.keepsBest() || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
     return made;

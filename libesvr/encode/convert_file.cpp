@@ -591,7 +591,7 @@ class SizeSearch {
         betterAsVoxels_(source.grids.size(), std::numeric_limits<double>::infinity()) {}
 
   ConvertedFile run() {
-    const double size = double(*options_.size), first = options_.previous.quality;
+    const double size = double(*options_.size), first = options_.previous.abovePreset;
     RootSearch search({kLeast, kMost, kNarrowest, kLongest, true}, std::log2(kAimedShare * size),
                       kOctavesPerDb, first);
     double before = 0.0;
@@ -639,27 +639,28 @@ class SizeSearch {
 
   /// Converts the file with a quality, and keeps it if it is the best one that keeps to the size.
   /// \return its bytes
-  std::uint64_t tryQuality(double more) {
+  std::uint64_t tryQuality(double abovePreset) {
     std::vector<bool> asVoxels(betterAsVoxels_.size());
-    for (std::size_t g = 0; g < asVoxels.size(); ++g) asVoxels[g] = more >= betterAsVoxels_[g];
-    converter_.tryGoal(PresetGoal{more}, std::move(asVoxels));
+    for (std::size_t g = 0; g < asVoxels.size(); ++g)
+      asVoxels[g] = abovePreset >= betterAsVoxels_[g];
+    converter_.tryGoal(PresetGoal{abovePreset}, std::move(asVoxels));
     ConvertedFile made = convertOnce(source_, options_, converter_, twins_);
     const std::uint64_t bytes = bytesOf(made.file);
     fewest_ = std::min(fewest_.value_or(bytes), bytes);
-    for (const GridConversion& grid : made.grids) learnFrom(grid, more);
-    const bool isWorse = best_ && (made.interrupted || best_->quality >= more);
+    for (const GridConversion& grid : made.grids) learnFrom(grid, abovePreset);
+    const bool isWorse = best_ && (made.interrupted || best_->abovePreset >= abovePreset);
     if (bytes > *options_.size || isWorse) return bytes;
-    made.quality = more;
+    made.abovePreset = abovePreset;
     best_ = std::move(made);
     return bytes;
   }
 
   /// Where voxels are better than ellipsoids, they are at any higher quality.
-  void learnFrom(const GridConversion& grid, double more) {
+  void learnFrom(const GridConversion& grid, double abovePreset) {
     seconds_[grid.source] += grid.secondsConvert;
     const auto& choice = grid.conversion.choice;
     if (grid.conversion.grid.voxels && choice && choice->ellipsoids)
-      betterAsVoxels_[grid.source] = std::min(betterAsVoxels_[grid.source], more);
+      betterAsVoxels_[grid.source] = std::min(betterAsVoxels_[grid.source], abovePreset);
   }
 
   [[nodiscard]] std::uint64_t bytesOf(const EsvrFile& file) const {
@@ -674,8 +675,9 @@ class SizeSearch {
   const Twins& twins_;
   std::optional<ConvertedFile> best_;
   std::optional<std::uint64_t> fewest_;
-  std::vector<double> seconds_;         ///< time that all conversions of each grid took
-  std::vector<double> betterAsVoxels_;  ///< quality from which on each grid is better as voxels
+  std::vector<double> seconds_;  ///< time that all conversions of each grid took
+  std::vector<double>
+      betterAsVoxels_;  ///< PresetGoal::abovePreset from which on each grid is better as voxels
 };
 
 /// Converts the grids to a file of at most a size.
@@ -686,7 +688,7 @@ ConvertedFile convertToSize(const FileSource& source, const FileOptions& options
     return SizeSearch(source, options, converter, twins).run();
   converter.setGoal(SizeGoal{*options.size - beside});
   ConvertedFile made = convertOnce(source, options, converter, twins);
-  if (!made.grids.empty()) made.quality = made.grids.front().conversion.more;
+  if (!made.grids.empty()) made.abovePreset = made.grids.front().conversion.abovePreset;
   return made;
 }
 

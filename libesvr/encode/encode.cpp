@@ -327,8 +327,8 @@ bool isQuality(const Goal& goal) {
 PresetQuality presetQuality(const ConvertOptions& options) {
   PresetQuality quality = qualityOf(options.fit.preset);
   if (const auto* goal = std::get_if<PresetGoal>(&options.goal)) {
-    quality.psnr += goal->more, quality.picturePsnr += goal->more;
-    quality.surfaceBound *= std::pow(10.0, -goal->more / 20.0);
+    quality.psnr += goal->abovePreset, quality.picturePsnr += goal->abovePreset;
+    quality.surfaceBound *= std::pow(10.0, -goal->abovePreset / 20.0);
   }
   return quality;
 }
@@ -343,7 +343,7 @@ double wantedQuality(const Job& job) {
 }
 
 /// By how many dB the quality of a conversion is above that of the preset; 0 if it is not known.
-double moreThanPreset(const Job& job, const Conversion& made) {
+double abovePreset(const Job& job, const Conversion& made) {
   if (!made.choice) return 0.0;
   const auto& stored = made.grid.voxels ? made.choice->voxels : made.choice->ellipsoids;
   const bool isKnown = stored && stored->psnr && std::isfinite(*stored->psnr);
@@ -764,7 +764,7 @@ std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput
                                    : layerErrorsOf(made->grid, given.source, judge->comparison());
   }
   made->byPictures = seesPictures(job);
-  if (std::holds_alternative<SizeGoal>(options.goal)) made->more = moreThanPreset(job, *made);
+  if (std::holds_alternative<SizeGoal>(options.goal)) made->abovePreset = abovePreset(job, *made);
   made->grid = throughTheFormat(std::move(made->grid), previous, memoryOf(given.source));
   requirePromises(job, made->grid);
   return made;

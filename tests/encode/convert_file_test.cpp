@@ -220,7 +220,7 @@ TEST(ConvertGridsToSize, GivesGridsThatAreAlikeOneQualityAndTellsOfEachOnce) {
   EXPECT_GE(double(bytes), 0.9 * double(kSize));
   EXPECT_THAT(told, ElementsAre(0, 1, 2));
   EXPECT_TRUE(made.grids[1].shared && made.grids[1].shared->with == std::size_t{0});
-  const double wanted = kStandardPsnr + made.quality;
+  const double wanted = kStandardPsnr + made.abovePreset;
   for (std::size_t g = 0; g < 3; ++g) {
     const double psnr = activePsnrOf(file.grids[g].read().volume, made.file.grids[g]);
     EXPECT_GE(psnr, wanted) << g;
@@ -245,12 +245,12 @@ TEST(ConvertGridsToSize, BeginsWithTheQualityOfTheFrameBefore) {
   FileOptions options = fileOptions(PresetGoal{});
   options.size = kSize;
   const ConvertedFile first = convertGrids(frame(0), options);
-  options.previous = {&first.file, {}, first.quality};
+  options.previous = {&first.file, {}, first.abovePreset};
   const ConvertedFile second = convertGrids(frame(1), options);
   const auto bytes = encodeFrame(second.file, &first.file).size();
   EXPECT_LE(bytes, kSize);
   EXPECT_GE(double(bytes), 0.85 * double(kSize));
-  EXPECT_GE(second.quality, first.quality);
+  EXPECT_GE(second.abovePreset, first.abovePreset);
 }
 
 TEST(ConvertGridsToSize, LeavesNoGridsWhereItIsCancelledBeforeAFileKeepsToIt) {
