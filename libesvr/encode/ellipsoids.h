@@ -69,7 +69,7 @@ struct Margin {
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
 /// Plan::wholeFits whole fits are made (up to four if few ellipsoids suffice, or while each is far above the PSNR; for a size
 /// up to five, if the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
-/// decide about their signs, and one that shows that averages do not suffice. A frame of a sequence continues the ellipsoids
+/// decide about their signs, and one that shows that averages do not suffice. One of them is continued for Preset::kHigh (probe()). A frame of a sequence continues the ellipsoids
 /// of the frame before instead of making short fits.
 class EllipsoidSearch {
  public:
@@ -131,6 +131,8 @@ class EllipsoidSearch {
   [[nodiscard]] double countOfFrame(const StoredGrid& before) const;
   void continueFrame();
   void decideSigns();
+  [[nodiscard]] bool mayProbe() const;
+  void probe();
   void forecast();
 
   [[nodiscard]] double behind() const;
@@ -160,6 +162,7 @@ class EllipsoidSearch {
   Margin margin_;
   double slope_;               ///< growth of the quality by twice the ellipsoids, dB
   bool slopeIsKnown_ = false;  ///< from two short fits
+  bool isProbed_ = false;      ///< the last short fit was continued by probe()
   bool isTooLarge_ = false;    ///< the short fits showed that the grid cannot stay below `below_`
   std::uint64_t maxCount_;
   std::optional<Attempt> draft_;    ///< the last short fit
