@@ -40,6 +40,7 @@ struct RunRecord {
   EsvrSummary output;
   std::uint64_t bytesSeparate = 0;  ///< of the file without sharing; 0: not known
   bool interrupted = false;
+  bool isTooLarge = false;   ///< ConvertedFile::isTooLarge
   double abovePreset = 0.0;  ///< ConvertedFile::abovePreset
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };

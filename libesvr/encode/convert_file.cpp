@@ -608,7 +608,7 @@ class SizeSearch {
       search.learn(std::log2(bytes));
     }
     const bool isCancelled = converter_.isCancelled();
-    if (!best_ && isCancelled) best_.emplace();
+    if (!best_ && isCancelled) best_ = std::move(smallest_);
     if (!best_)
       throw UsageError("the smallest file that was found takes " + std::to_string(*fewest_) +
                        " bytes; the size allows " + std::to_string(*options_.size) +
@@ -646,12 +646,18 @@ class SizeSearch {
     converter_.tryGoal(PresetGoal{abovePreset}, std::move(asVoxels));
     ConvertedFile made = convertOnce(source_, options_, converter_, twins_);
     const std::uint64_t bytes = bytesOf(made.file);
-    fewest_ = std::min(fewest_.value_or(bytes), bytes);
+    if (!made.interrupted) fewest_ = std::min(fewest_.value_or(bytes), bytes);
     for (const GridConversion& grid : made.grids) learnFrom(grid, abovePreset);
-    const bool isWorse = best_ && (made.interrupted || best_->abovePreset >= abovePreset);
-    if (bytes > *options_.size || isWorse) return bytes;
     made.abovePreset = abovePreset;
-    best_ = std::move(made);
+    made.isTooLarge = bytes > *options_.size;
+    if (!best_ && made.isTooLarge) {
+      if (!smallest_ || (!made.interrupted && bytes == *fewest_)) smallest_ = std::move(made);
+      return bytes;
+    }
+    // Grids that are missing are worse than a file that is too large.
+    const bool isWorse =
+        (best_ && best_->abovePreset >= abovePreset) || (made.interrupted && (best_ || smallest_));
+    if (!made.isTooLarge && !isWorse) best_ = std::move(made), smallest_.reset();
     return bytes;
   }
 
@@ -673,7 +679,8 @@ class SizeSearch {
   const FileOptions& options_;
   GridConverter& converter_;
   const Twins& twins_;
-  std::optional<ConvertedFile> best_;
+  std::optional<ConvertedFile> best_;      ///< of those that keep to the size
+  std::optional<ConvertedFile> smallest_;  ///< as long as none does
   std::optional<std::uint64_t> fewest_;
   std::vector<double> seconds_;  ///< time that all conversions of each grid took
   std::vector<double>

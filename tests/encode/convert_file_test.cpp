@@ -253,19 +253,26 @@ TEST(ConvertGridsToSize, BeginsWithTheQualityOfTheFrameBefore) {
   EXPECT_GE(second.abovePreset, first.abovePreset);
 }
 
-TEST(ConvertGridsToSize, LeavesNoGridsWhereItIsCancelledBeforeAFileKeepsToIt) {
-  CancelToken token;
-  FileOptions options = fileOptions(PresetGoal{});
-  options.size = 500;
-  options.convert.fit.cancel = &token;
-  options.onStep = [&](const GridStep& step) {
-    step.run();
-    token.cancel();
-  };
-  const ConvertedFile made = convertGrids(
-      fileOf({{"a", softBall({}, 1.0f, 16.0)}, {"b", softBall({3, 0, 0}, 1.0f)}}), options);
-  EXPECT_TRUE(made.interrupted);
-  EXPECT_LE(encodeEsvr(made.file).size(), 500u);
+TEST(ConvertGridsToSize, LeavesItsSmallestFileWhereItIsCancelledBeforeOneKeepsToIt) {
+  constexpr std::uint64_t kSize = 500;
+  const FileSource file =
+      fileOf({{"a", softBall({}, 1.0f, 16.0)}, {"b", softBall({3, 0, 0}, 1.0f)}});
+  for (const int stepsUntil : {1, 2, 3}) {  // in the first trial, at its end, and in the second one
+    CancelToken token;
+    FileOptions options = fileOptions(PresetGoal{});
+    options.size = kSize;
+    options.severalAtOnce = false;
+    options.convert.fit.cancel = &token;
+    int steps = 0;
+    options.onStep = [&](const GridStep& step) {
+      step.run();
+      if (++steps == stepsUntil) token.cancel();
+    };
+    const ConvertedFile made = convertGrids(file, options);
+    EXPECT_TRUE(made.interrupted);
+    EXPECT_EQ(made.grids.size(), stepsUntil == 1 ? 1u : 2u) << stepsUntil;
+    EXPECT_EQ(made.isTooLarge, encodeEsvr(made.file).size() > kSize);
+  }
 }
 
 /// Each ball is in a chunk of its own, and a twin has a row of the table for each of them.

@@ -167,13 +167,15 @@ struct ConvertedFile {
   std::vector<CarriedVector> carriedVectors;
   /// The conversion was cancelled; grids and vectors that were not complete are left out.
   bool interrupted = false;
+  /// It was cancelled before a file was found that keeps to the size; this is the smallest one so far.
+  bool isTooLarge = false;
   bool isShared = false;     ///< the grids were compared with each other
   double abovePreset = 0.0;  ///< PresetGoal::abovePreset of grids that keep to a size, about
 };
 
 /// Converts the grids of a file. The result is as deterministic as convertVolume(). A cancelled call
-/// (FitOptions::cancel, or the token of the thread) returns the grids that are complete; none where no file was found
-/// that keeps to the size.
+/// (FitOptions::cancel, or the token of the thread) returns the grids that are complete; of a size, those of
+/// the best file that keeps to it, or else of the smallest one (ConvertedFile::isTooLarge).
 /// \throws UsageError  no file of the size was found; as for convertVolume
 /// \throws  what the sources throw, and as for convertVolume
 [[nodiscard]] ConvertedFile convertGrids(FileSource source, const FileOptions& options = {});
