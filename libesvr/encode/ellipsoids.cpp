@@ -2,144 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 #include <vector>
 
 #include "core/parallel.h"
-#include "encode/signs.h"
 #include "encode/tone.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/resolution.h"
-#include "format/section_table.h"
 
 namespace esvr::encode {
-
-namespace {
-
-/// Share of the active voxels with an extreme value from which on a volume saturates.
-constexpr double kSaturatedShare = 0.05;
-
-}  // namespace
-
-bool saturates(const SparseVolume& volume) {
-  const ValueRange range = activeRange(volume);
-  const auto isExtreme = [&](float v) {
-    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
-  };
-  using Range = tbb::blocked_range<std::size_t>;
-  const auto extreme = parallelReduce(
-      Range(0, volume.brickCount()), std::uint64_t{0},
-      [&](const Range& bricks, std::uint64_t count) {
-        for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
-          for (int v = 0; v < kBrickVoxels; ++v)
-            count += isExtreme(volume.brickValues(b)[std::size_t(v)]) && volume.active[b].test(v);
-        return count;
-      },
-      std::plus<>());
-  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
-}
-
-// ---- The stored grid of a fit
-
-namespace {
-
-/// PSNR of the sum over the box at the end of a fit, as the device of the fit measures it.
-double lastPsnr(const FitResult& fit) { return fit.curve.empty() ? 0.0 : fit.curve.back().psnrBox; }
-
-/// Rows for the errors of the layers of a judged grid, which are measured when everything else is done
-/// (measureLayers). Their bytes count before.
-void reserveLayerErrors(const Job& job, StoredGrid& grid) {
-  if (!job.judge) return;
-  const std::size_t layers = layerCount(grid);
-  grid.layerErrors.assign(layers > 1 ? layers : 0, {});
-}
-
-/// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
-/// cancelled meanwhile. Rate control passes over the whole volume on the device of the fit, or on the
-/// CPU if the fit was divided into chunks, because the volume may not fit into the GPU's memory.
-/// \param round  makes the result; its argument is the target with the box, the peak and the device of the job
-template <class Round>
-CompactResult roundedBy(const Job& job, const StoredGrid& grid, const FitResult& fit,
-                        CompactOptions target, const Round& round) {
-  const FitOptions& wanted = job.options.fit;
-  if (job.judge) target.layerErrors = false;
-  target.box = wanted.box;
-  target.peak = wanted.peak;
-  target.device = fit.chunks > 1 ? Device{} : wanted.device;
-  auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
-    if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return round(target);
-  });
-  if (!found) {
-    const BestSoFar completion;
-    target.quick = true;
-    found = compactGrid(grid, job.input.source, target);
-  }
-  reserveLayerErrors(job, found->grid);
-  return std::move(*found);
-}
-
-CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
-                          const CompactOptions& target) {
-  return roundedBy(job, grid, fit, target, [&](const CompactOptions& options) {
-    return compactGrid(grid, job.input.source, options);
-  });
-}
-
-Conversion conversionOf(FitResult fit, CompactResult compact) {
-  Conversion conversion;
-  conversion.grid = std::move(compact.grid);
-  conversion.fit = std::move(fit);
-  conversion.compact = CompactRecord{compact.loss, compact.steps};
-  return conversion;
-}
-
-}  // namespace
-
-StoredGrid storedGridOf(const Job& job, FitResult& fit) {
-  const auto made = [&](Activity activity) {
-    return makeStoredGrid(job.input.descriptor, job.input.source, fit.field, activity);
-  };
-  const Activity wanted = job.options.storage.activity;
-  auto grid = unlessCancelled([&]() -> std::optional<StoredGrid> {
-    if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return made(wanted);
-  });
-  if (!grid) {
-    const BestSoFar completion;
-    fit.end = FitEnd::kCancelled;
-    grid = made(wanted);
-  }
-  fit.field = {};
-  return std::move(*grid);
-}
-
-Conversion storedAs(const Job& job, FitResult fit, StoredGrid grid, const CompactOptions& target) {
-  if (job.options.storage.form == Storage::kFloat32) {
-    Conversion conversion;
-    conversion.fit = std::move(fit);
-    conversion.grid = std::move(grid);
-    return conversion;
-  }
-  CompactResult compact = compactedTo(job, grid, fit, target);
-  return conversionOf(std::move(fit), std::move(compact));
-}
-
-double psnrOf(const Job& job, const Conversion& conversion) {
-  const auto measured = unlessCancelled([&]() -> std::optional<double> {
-    if (isCancelled(job)) return std::nullopt;
-    return psnrOf(job, conversion.grid);
-  });
-  if (measured) return *measured;
-  return lastPsnr(conversion.fit) - (conversion.compact ? conversion.compact->loss : 0.0);
-}
-
-std::uint64_t bytesOfEllipsoids(const StoredGrid& grid) {
-  const BestSoFar completion;
-  return bytesAdded(grid);
-}
 
 // ---- Fits
 
@@ -214,17 +86,8 @@ constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
 /// Fits of fewer ellipsoids take little time, and one more or less decides.
 constexpr double kVoxelsOfAverages = 800.0, kFewestOfAverages = 200.0, kMostOfAveraging = 0.5;
 constexpr std::uint32_t kMostIterationsOfAverages = 1000;
-/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, and the fits after which a size is given
-/// up.
-constexpr double kMoreEach = 1.25;
-constexpr int kFitsUntilOneIsSmall = 5;
-/// Of the residual of the signs of a narrow band (Lab, "Signs of a size"): the largest share of a size with which ellipsoids are
-/// of use, its bytes with a whole fit relative to those with a short one, the growth for which a fit that follows one without
-/// enough room for it allows, the share of a size that is used well, how often the bytes are divided, and the loss by rounding,
-/// dB, below which a first fit was left so much room that another one has more ellipsoids.
-constexpr double kMostOfSigns = 0.5, kSignsOfWholeFit = 0.75, kMoreSigns = 0.2,
-                 kLeastShareWithSigns = 0.97, kSpareLoss = 0.35;
-constexpr int kMostDivisions = 3;
+/// Bytes of the residual of the signs of a narrow band with a whole fit, relative to those with a short one (Lab, "Signs of a size").
+constexpr double kSignsOfWholeFit = 0.75;
 /// Limits of the loss by rounding for a judge, dB over the box.
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
@@ -236,13 +99,6 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 // Of twelve first fits that were 1.9 to 3.1 dB above their PSNR, those up to 2.3 dB were rounded to fewer bytes than a
 // second fit took, or to at most 6 % more, and those above 2.8 dB to 7 to 38 % more.
 Margin compactMargin(double usualLoss) { return {usualLoss, 0.39 * usualLoss, 2.5 * usualLoss}; }
-
-/// The bytes that sections of ellipsoids may take besides those that rate control counts.
-std::uint64_t paddingOf(const CompactResult& made) {
-  return made.grid.field.chunks.size() * (format::kAlignment - 1);
-}
-
-double countOf(const Attempt& a) { return double(std::max<std::size_t>(a.count(), 1)); }
 
 FitPoint pointOf(const Attempt& a) { return {double(a.asked), a.psnr}; }
 
@@ -298,48 +154,6 @@ void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
 
 namespace {
 
-FitOptions optionsFor(const Job& job, double count, std::uint32_t iterations) {
-  FitOptions options = job.options.fit;
-  const double most = double(std::max<std::uint64_t>(activeVoxelCount(job.input.source), 1));
-  options.count = std::size_t(std::clamp(std::floor(count), 1.0, most));
-  options.psnr.reset();
-  options.seconds.reset();
-  options.iterations = iterations;
-  return options;
-}
-
-/// A fit to the input of a job, or to its averages. Its field and that of options.start are among the voxels of the input.
-FitResult fitted(const Job& job, FitOptions options) {
-  if (!job.averages) return fit(job.input.source, options);
-  Field start;
-  if (options.start) start = amongOtherVoxels(*options.start, kAveraged), options.start = &start;
-  if (!options.peak) options.peak = peakOf(job.input.source);
-  FitResult made = fit(*job.averages, options);
-  made.field = amongOtherVoxels(std::move(made.field), 1.0 / kAveraged);
-  return made;
-}
-
-Attempt attempted(const Job& job, const FitOptions& options) {
-  Attempt result;
-  result.asked = *options.count;
-  result.fit = fitted(job, options);
-  result.grid = storedGridOf(job, result.fit);
-  const SparseVolume& source = job.input.source;
-  const auto judged = unlessCancelled([&]() -> std::optional<Judge::Judgement> {
-    if (result.cancelled()) return std::nullopt;
-    SparseVolume decoded = decodeGrid(result.grid, {.memory = memoryOf(source)});
-    if (job.averages)
-      result.psnrOfVoxels =
-          psnrOverBox(source, decoded, {.peak = options.peak ? *options.peak : peakOf(source)});
-    if (!job.judge) return Judge::Judgement{psnrOf(job, std::move(decoded))};
-    return (*job.judge)(std::move(decoded));
-  });
-  if (!judged) result.fit.end = FitEnd::kCancelled;
-  result.psnr = judged ? judged->quality : lastPsnr(result.fit);
-  result.forTones = judged ? judged->forTones : 0.0;
-  return result;
-}
-
 /// The number of ellipsoids of the first short fit for a size, and for a PSNR.
 double firstCount(const Job& job) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
@@ -349,10 +163,6 @@ double firstCount(const Job& job) {
 }
 
 }  // namespace
-
-Attempt shortFitOf(const Job& job, double count) {
-  return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
-}
 
 double scoutCount(const Job& job) {
   const double most = std::clamp(double(job.input.source.brickCount()) / kBricksOfScout,
@@ -850,106 +660,6 @@ Conversion EllipsoidSearch::smallestOrBest() {
       reached_ = before;
   }
   return std::move(*smallest);
-}
-
-/// A grid with the residual of its signs, if it is a narrow band of a size, where these take room that ellipsoids lack.
-void EllipsoidSearch::addSigns(CompactResult& made) {
-  if (!options_.fit.narrowBand || !goal_.bytes) return;
-  const std::uint64_t without = bytesOfEllipsoids(made.grid);
-  made.grid = completedWithSigns(std::move(made.grid), job_.input.source);
-  signs_ = bytesOfEllipsoids(made.grid) - without;
-}
-
-/// False if what is beside the ellipsoids leaves them too few bytes.
-bool EllipsoidSearch::hasRoom() const {
-  return besides_ < *goal_.bytes && double(signs_) <= kMostOfSigns * double(*goal_.bytes);
-}
-
-/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger than those of the attempt
-/// before; the bytes are then divided again.
-/// \return nothing if the other sections take too many bytes
-std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
-  if (signs_ > 0) return filledWithSigns(attempt);
-  for (int n = 0;; ++n) {
-    if (!hasRoom()) return std::nullopt;
-    CompactResult now = compacted(attempt, {.bytes = *goal_.bytes - besides_});
-    addSigns(now);
-    needed_ = bytesOfEllipsoids(now.grid);
-    const std::uint64_t besides = needed_ - now.bytes + paddingOf(now);
-    if (n > 0 || besides <= besides_ + paddingOf(now)) return now;
-    besides_ = besides;
-  }
-}
-
-/// The same for a narrow band. The bytes of its signs differ from what they were with other steps, so that they are divided
-/// again until the size is used well. A result that is too large needs another fit, since coarser steps have more wrong signs.
-std::optional<CompactResult> EllipsoidSearch::filledWithSigns(const Attempt& attempt) {
-  std::optional<CompactResult> best;
-  const std::uint64_t size = *goal_.bytes;
-  for (int n = 0; n < kMostDivisions && hasRoom(); ++n) {
-    const std::uint64_t room = besides_;
-    CompactResult now = compacted(attempt, {.bytes = size - room});
-    addSigns(now);
-    const std::uint64_t needed = bytesOfEllipsoids(now.grid);
-    const bool isOver = needed > size;
-    if (isOver && best) break;
-    needed_ = needed;
-    besides_ = needed - now.bytes + paddingOf(now);
-    best = std::move(now);
-    if (isOver) besides_ += std::uint64_t(kMoreSigns * double(signs_));
-    if (isOver || double(needed) >= kLeastShareWithSigns * double(size)) break;
-  }
-  return best;
-}
-
-/// As many ellipsoids as the size allows. Where they take more bytes than expected, or would lose too
-/// much by rounding, the fit is repeated with fewer.
-std::optional<Conversion> EllipsoidSearch::runToSize() {
-  std::optional<Conversion> best;
-  double quality = 0.0, each = price_;
-  const auto take = [&](Attempt attempt, CompactResult now) {
-    best = conversionOf(std::move(attempt.fit), std::move(now));
-  };
-  for (int fits = 0; fits < (best ? plan_.wholeFits : kFitsUntilOneIsSmall); ++fits) {
-    if (draft_->cancelled() || !hasRoom()) break;
-    const double count = double(*goal_.bytes - besides_) / each;
-    auto attempt = unlessCancelled([&]() -> std::optional<Attempt> { return wholeFit(count); });
-    if (!attempt) {
-      draft_->fit.end = FitEnd::kCancelled;
-      break;
-    }
-    auto now = filled(*attempt);
-    if (!now) break;
-    const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= rounding_.mostLoss;
-    // The first fit may have been left more room for its signs than it needs.
-    const bool isSpare = fits == 0 && signs_ > 0 && now->loss < kSpareLoss;
-    const bool isLast =
-        attempt->cancelled() || (isSmall && isGood && !isSpare) || attempt->asked == 1;
-    if (!isLast)
-      each = std::max(
-          double(compacted(*attempt, {.loss = rounding_.usualLoss, .layerErrors = false}).bytes) /
-              countOf(*attempt),
-          signs_ > 0 ? 0.0 : kMoreEach * each);
-    attempts_.assign(1, *attempt);  // the next fit may continue it
-    if (isSmall) {
-      const double reached = completed(*attempt, *now);
-      if (!best || reached > quality) {
-        quality = reached;
-        if (job_.judge) reached_ = reached;
-        take(std::move(*attempt), std::move(*now));
-      }
-    }
-    if (isLast) break;
-  }
-  if (best || !draft_->cancelled()) return best;
-  // Nothing was found before the cancellation: the last fit is completed.
-  Attempt last = std::move(attempts_.empty() ? *draft_ : attempts_.front());
-  last.fit.end = FitEnd::kCancelled;
-  auto now = filled(last);
-  if (!now || needed_ > *goal_.bytes) throw Cancelled();
-  (void)completed(last, *now);
-  take(std::move(last), std::move(*now));
-  return best;
 }
 
 }  // namespace esvr::encode

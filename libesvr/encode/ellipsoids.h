@@ -6,8 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "encode/job.h"
-#include "encode/rate_control.h"
+#include "encode/attempt.h"
 
 namespace esvr::encode {
 
@@ -22,43 +21,8 @@ struct Rounding {
   double usualLoss, mostLoss, factor;
 };
 
-/// A fit, and its grid in float32.
-struct Attempt {
-  FitResult fit;          ///< its field was moved to the grid
-  StoredGrid grid;        ///< grid in float32
-  double psnr = 0.0;      ///< quality, dB
-  double forTones = 0.0;  ///< Judge::Judgement::forTones
-  /// PSNR over the box of the input, dB, if the fit is one to its averages, of which the fit's own PSNR is.
-  double psnrOfVoxels = 0.0;
-  std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
-
-  [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
-  [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
-};
-
-/// A short fit, by itself.
-/// \param count  wanted number of ellipsoids
-[[nodiscard]] Attempt shortFitOf(const Job& job, double count);
-
 /// The number of ellipsoids of a short fit that shows what suits a job, before anything is known.
 [[nodiscard]] double scoutCount(const Job& job);
-
-/// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
-/// are found by value, and the end of the fit becomes kCancelled.
-[[nodiscard]] StoredGrid storedGridOf(const Job& job, FitResult& fit);
-
-/// Makes a conversion of a fit and its grid in float32, in the form that the options want: compacted
-/// to the target unless the storage is kFloat32.
-/// \param target  its loss, psnr and bytes count; the rest follows from the job
-[[nodiscard]] Conversion storedAs(const Job& job, FitResult fit, StoredGrid grid,
-                                  const CompactOptions& target);
-
-/// The PSNR of a conversion over the box, dB: measured, or, if that is cancelled, what the fit and rate
-/// control have measured.
-[[nodiscard]] double psnrOf(const Job& job, const Conversion& conversion);
-
-/// bytesAdded() of a grid of ellipsoids, which takes little time, so that nothing cancels it.
-[[nodiscard]] std::uint64_t bytesOfEllipsoids(const StoredGrid& grid);
 
 /// dB by which the float32 grid should exceed a PSNR: the best value, and the limits within which the size
 /// hardly differs.
@@ -175,9 +139,5 @@ class EllipsoidSearch {
   std::optional<double>
       reached_;  ///< the judged quality, dB, of the conversion that was made last or kept
 };
-
-/// True if many active voxels have an extreme value of the volume, so that both signs of intensities
-/// may be better.
-[[nodiscard]] bool saturates(const SparseVolume& volume);
 
 }  // namespace esvr::encode
