@@ -98,7 +98,7 @@ void takeFigures(const RunRecord& run, FrameRecord& frame) {
   const Ratio ratio = ratioOf(run);
   frame.bytesIn = ratio.bytesIn, frame.bytesOut = ratio.bytesOut;
   frame.seconds = run.secondsTotal;
-  frame.quality = run.quality;
+  frame.abovePreset = run.abovePreset;
   for (const ConvertedGrid& grid : run.grids) {
     const VolumeMetrics& m = grid.metrics;
     const auto light = m.transmittance ? std::optional(m.transmittance->psnr50) : std::nullopt;

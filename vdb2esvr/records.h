@@ -40,7 +40,8 @@ struct RunRecord {
   EsvrSummary output;
   std::uint64_t bytesSeparate = 0;  ///< of the file without sharing; 0: not known
   bool interrupted = false;
-  double quality = 0.0;  ///< ConvertedFile::quality
+  bool isTooLarge = false;   ///< ConvertedFile::isTooLarge
+  double abovePreset = 0.0;  ///< ConvertedFile::abovePreset
   double secondsWrite = 0.0, secondsTotal = 0.0;
 };
 
@@ -113,7 +114,7 @@ struct FrameRecord {
   std::optional<Error> failure{};
   nlohmann::ordered_json report{};   ///< the frame's own report, if one is wanted
   std::vector<GridBefore> before{};  ///< FrameBefore::grids for the next frame of its group
-  double quality = 0.0;              ///< FrameBefore::quality for it
+  double abovePreset = 0.0;          ///< FrameBefore::abovePreset for it
 };
 
 /// The figures of a file for all frames.

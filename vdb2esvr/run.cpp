@@ -221,8 +221,8 @@ class FileConversion {
     for (const GridConversion& grid : made.grids) record.grids.push_back(recordOf(grid));
     listVectors(made, record);
     listCarried(made, record);
-    record.interrupted = made.interrupted;
-    record.quality = made.quality;
+    record.interrupted = made.interrupted, record.isTooLarge = made.isTooLarge;
+    record.abovePreset = made.abovePreset;
     if (record.interrupted && (!options_.keepsBest() || record.grids.empty()))
       throw RuntimeFailure("interrupted; " + whatIsLeft());
     return made;
@@ -363,6 +363,7 @@ void tellResult(const Options& options, const RunRecord& record) {
 void throwWhatIsAmiss(const Options& options, const RunRecord& record) {
   if (record.interrupted) {
     std::string text = "interrupted; " + options.output.string() + " has the best result so far";
+    if (record.isTooLarge) text += ", which is larger than the size";
     for (const auto& name : record.notFitted) text += ", without grid \"" + name + "\"";
     throw RuntimeFailure(text);
   }

@@ -401,12 +401,12 @@ class GroupConversion {
     FrameRecord& frame = conversion_.frames()[index];
     Options own = conversion_.optionsOf(frame.frame, worker_);
     own.resume = false;  // the group is converted again as a whole
-    if (previous_) own.previous = {&*previous_, before_, quality_};
+    if (previous_) own.previous = {&*previous_, before_, abovePreset_};
     last_.input = stateOf(frame.frame);
     conversion_.convert(own, frame, [&](const EsvrFile& file) { return encode(index, file); });
     keepEncoded();
     before_ = std::exchange(frame.before, {});
-    quality_ = frame.quality;
+    abovePreset_ = frame.abovePreset;
   }
 
   void hold(std::size_t index) {
@@ -445,7 +445,7 @@ class GroupConversion {
   std::vector<EncodedFrame> encoded_;
   std::optional<EsvrFile> previous_;  ///< the last frame of the group as a reader gets it
   std::vector<GridBefore> before_;    ///< FrameBefore::grids of it
-  double quality_ = 0.0;              ///< FrameBefore::quality of it
+  double abovePreset_ = 0.0;          ///< FrameBefore::abovePreset of it
   EncodedFrame last_;                 ///< the frame that was encoded last
   EsvrFile decoded_;                  ///< the same as a reader gets it
 };

@@ -1,15 +1,10 @@
 // Converts the grids of a file together: vectors get one scale, grids of equal voxels are converted once, small grids
-// are converted at the same time, and vectors that are smaller unchanged are carried. share_grids.cpp then lets
+// are converted at the same time, and vectors that are smaller unchanged are carried. grid_converter.cpp has the single grids; share_grids.cpp then lets
 // voxels refer to those of another grid. For a size, this is repeated with other qualities.
 #include "esvr/convert_file.h"
 
-#include <tbb/global_control.h>
-#include <xxhash.h>
-
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <future>
 #include <limits>
 #include <map>
 #include <string>
@@ -24,296 +19,13 @@
 #include "esvr/error.h"
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
-#include "format/bytes.h"
 
 namespace esvr {
-
-// ---- Equal inputs
-
-namespace {
-
-template <class Items>
-void putHash(format::ByteWriter& out, const Items& items) {
-  const XXH128_hash_t hash = XXH3_128bits(items.data(), items.size() * sizeof(items.front()));
-  for (const std::uint64_t word : {std::uint64_t(items.size()), hash.low64, hash.high64})
-    out.put(word);
-}
-
-void putVolume(format::ByteWriter& out, const SparseVolume& volume) {
-  for (const auto v : {volume.origin.x, volume.origin.y, volume.origin.z}) out.put(v);
-  out.put(volume.background);
-  putHash(out, volume.bricks);
-  putHash(out, volume.values);
-  putHash(out, volume.active);
-}
-
-/// A hash of the active voxels of a volume, whatever their values.
-InputKey activeKeyOf(const SparseVolume& volume) {
-  std::vector<Coord> corners;
-  std::vector<BrickMask> masks;
-  for (std::size_t b = 0; b < volume.brickCount(); ++b) {
-    if (volume.active[b].count() == 0) continue;
-    corners.push_back(volume.brickCorner(b));
-    masks.push_back(volume.active[b]);
-  }
-  format::ByteWriter out;
-  putHash(out, corners);
-  putHash(out, masks);
-  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
-  return {hash.low64, hash.high64};
-}
-
-}  // namespace
-
-InputKey keyOf(const ConvertInput& input) {
-  format::ByteWriter out;
-  // The class decides whether a grid is a narrow band. A lossless goal refuses doubles.
-  out.put(std::uint8_t(input.descriptor.gridClass == GridClass::kLevelSet));
-  out.put(std::uint8_t(input.descriptor.valueType == ValueType::kDouble));
-  putVolume(out, input.source);
-  const XXH128_hash_t hash = XXH3_128bits(out.bytes().data(), out.size());
-  return {hash.low64, hash.high64};
-}
-
-// ---- One grid, and several at the same time
-
-namespace {
-
-/// True for a grid whose conversion keeps few threads busy: its voxels are coded in one or two blocks, each on one thread.
-bool isSmall(const GridSource& grid) {
-  constexpr std::uint64_t kMostActive = std::uint64_t{1} << 20;
-  return grid.activeVoxels <= kMostActive;
-}
-
-}  // namespace
-
-namespace encode {
-
-void forEachAtOnce(std::size_t count, std::size_t threads,
-                   const std::function<void(std::size_t)>& body) {
-  std::atomic<std::size_t> next{0};
-  const CancelToken* const token = CancelScope::token();
-  const auto work = [&] {
-    const CancelScope scope(token);
-    try {
-      for (std::size_t i; !CancelScope::cancelled() && (i = next++) < count;) body(i);
-    } catch (...) {
-      next = count;
-      throw;
-    }
-  };
-  std::vector<std::future<void>> others;
-  for (std::size_t t = 1; t < std::min(threads, count); ++t)
-    others.push_back(std::async(std::launch::async, work));
-  auto own = std::async(std::launch::deferred, work);
-  own.wait();
-  for (auto& other : others) other.wait();
-  own.get();
-  for (auto& other : others) other.get();
-}
-
-bool GridConverter::isCancelled() const {
-  const CancelToken* const token = CancelScope::orToken(fit_.cancel);
-  return token && token->cancelled();
-}
-
-void GridConverter::step(std::size_t g, bool isAlone,
-                         const std::function<void(const FitOptions&)>& run) {
-  FitOptions own = fit_;
-  FitOptions& fit = isAlone ? fit_ : own;
-  fit.progress = options_.convert.fit.progress;  // the one of an earlier step may be gone
-  const std::function<void()> withOptions = [&] { run(fit); };
-  if (options_.onStep)
-    options_.onStep({g, isAlone, fit, withOptions});
-  else
-    withOptions();
-}
-
-void GridConverter::findScales() {
-  for (std::size_t g = 0; g < grids_.size(); ++g)
-    if (grids_[g].component == std::size_t{0})
-      step(g, true, [&](const FitOptions&) { findScale(g); });
-}
-
-void GridConverter::findScale(std::size_t g) {
-  VectorVolume vectors;
-  Transform transform;
-  if (grids_[g].readVector) {
-    VectorGrid grid = grids_[g].readVector();
-    transform = std::move(grid.descriptor.transform);
-    vectors = std::move(grid.components);
-  } else {
-    for (std::size_t c = 0; c < kComponents; ++c) {
-      VolumeGrid grid = grids_.at(g + c).read();
-      transform = std::move(grid.descriptor.transform);
-      vectors[c] = std::move(grid.volume);
-    }
-  }
-  sets_.push_back({activeKeyOf(vectors.front()), std::move(transform)});
-  const VectorScale scale{peakOfVectors(vectors), valueRangeOfVectors(vectors)};
-  for (std::size_t c = 0; c < kComponents; ++c) scales_.at(g + c) = scale;
-}
-
-SourceKey GridConverter::keyOf(std::size_t g, const VolumeGrid& source) const {
-  return {esvr::keyOf({source.descriptor, source.volume}), scales_[g].peak, scales_[g].range,
-          grids_[g].goal, source.narrowing.largest()};
-}
-
-namespace {
-
-/// Subtracts from a bound what is lost because doubles become floats. Their range, to which a bound in % refers, may be
-/// lost, too.
-void allowForNarrowing(const VolumeGrid& source, Goal& goal) {
-  const Narrowing& narrowing = source.narrowing;
-  if (narrowing.errors.count() == 0) return;
-  const auto less = [&](double bound, double lost, const char* unit = "") {
-    if (lost < bound) return bound - lost;
-    const auto [by, most] = textsApart(lost, bound, "%.*g", 6);
-    throw CannotConvert("grid '" + shownName(source.descriptor.name) +
-                        "': floats differ from its doubles by up to " + by + unit +
-                        ", and the bound is " + most);
-  };
-  if (auto* within = std::get_if<BoundGoal>(&goal)) {
-    const double range = narrowing.max - narrowing.min;
-    if (!within->relative || range > 0.0)
-      *within = {
-          less(within->relative ? within->bound * range : within->bound, narrowing.largest())};
-  } else if (auto* share = std::get_if<RelativeBoundGoal>(&goal)) {
-    share->share = less(share->share, narrowing.relativeAbove(share->floor), " times their values");
-  }
-}
-
-}  // namespace
-
-const Goal& GridConverter::goalOf(std::size_t g) const {
-  if (goal_) return *goal_;
-  return grids_[g].goal ? *grids_[g].goal : options_.convert.goal;
-}
-
-/// The goal of a grid. A bound in % of the range of vectors is the same for all components.
-Goal GridConverter::resolvedGoal(std::size_t g, const VolumeGrid& source) const {
-  Goal goal = goalOf(g);
-  const auto& range = scales_[g].range;
-  if (auto* within = std::get_if<BoundGoal>(&goal); within && within->relative && range)
-    *within = {within->bound * *range, false};
-  allowForNarrowing(source, goal);
-  return goal;
-}
-
-const StoredGrid* GridConverter::previousOf(std::size_t g) const {
-  if (!options_.previous.file) return nullptr;
-  const std::string name = grids_[g].storedName();
-  std::size_t before = 0;
-  for (std::size_t other = 0; other < g; ++other) before += grids_[other].storedName() == name;
-  for (const StoredGrid& grid : options_.previous.file->grids)
-    if (grid.descriptor.name == name && before-- == 0) return &grid;
-  return nullptr;
-}
-
-/// True for the components of vectors, and for grids with the active voxels of vectors. A vector is active where any
-/// component is, so that by their values a component would add voxels to it or lose some. The exact set is stored
-/// once for all of these grids, or follows from that of the grid that their voxels refer to.
-bool GridConverter::needsExactSet(std::size_t g, const VolumeGrid& source) const {
-  if (grids_[g].component) return true;
-  return !sets_.empty() &&
-         std::ranges::find(sets_, ActiveSet{activeKeyOf(source.volume),
-                                            source.descriptor.transform}) != sets_.end();
-}
-
-/// What is known of a grid of the previous frame; null if nothing is.
-const GridBefore* GridConverter::recordOf(const StoredGrid* previous) const {
-  if (!previous) return nullptr;
-  const std::span<const GridBefore> grids = options_.previous.grids;
-  const auto at = std::size_t(previous - options_.previous.file->grids.data());
-  return at < grids.size() ? &grids[at] : nullptr;
-}
-
-/// True if the same grid of the previous frame was made from the same source.
-bool GridConverter::isAsBefore(const StoredGrid* previous, const VolumeGrid& source,
-                               const SourceKey& key) const {
-  const GridBefore* before = recordOf(previous);
-  return before && before->key == key &&
-         previous->descriptor.valueType == source.descriptor.valueType;
-}
-
-GridConversion GridConverter::make(std::size_t g, bool isAlone) {
-  GridConversion made;
-  step(g, isAlone, [&](const FitOptions& fit) {
-    double secondsRead = 0.0, secondsConvert = 0.0;
-    const VolumeGrid source = addSeconds(secondsRead, [&] { return read(g); });
-    made = addSeconds(secondsConvert, [&] { return convert(g, source, nullptr, fit); });
-    made.secondsRead = secondsRead, made.secondsConvert = secondsConvert;
-    tell(source, made);
-  });
-  return made;
-}
-
-void GridConverter::tell(const VolumeGrid& source, const GridConversion& made) const {
-  if (options_.onConverted && !isTrial_) options_.onConverted(source, made);
-}
-
-void GridConverter::tellAll(const std::vector<GridConversion>& grids) {
-  isTrial_ = false;
-  if (!options_.onConverted) return;
-  const Completion completion;
-  const bool areSmall = std::ranges::all_of(
-      grids, [&](const GridConversion& grid) { return isSmall(grids_[grid.source]); });
-  forEachAtOnce(grids.size(), areSmall ? mostAtOnce() : 1, [&](std::size_t i) {
-    if (grids[i].twinOf) return;
-    step(grids[i].source, false, [&](const FitOptions&) { tell(read(grids[i].source), grids[i]); });
-  });
-}
-
-std::size_t GridConverter::mostAtOnce() const {
-  // A GPU then has as many grids at a time as it has frames of a sequence.
-  constexpr std::size_t kAtOnce = 4;
-  using Limit = tbb::global_control;
-  const std::size_t threads = Limit::active_value(Limit::max_allowed_parallelism);
-  return options_.severalAtOnce ? std::min(kAtOnce, threads) : 1;
-}
-
-GridConversion GridConverter::convert(std::size_t g, const VolumeGrid& source,
-                                      const StoredGrid* expected, const FitOptions& fit) const {
-  GridConversion made{.source = g, .convertedAs = g, .key = keyOf(g, source)};
-  made.bricks = source.volume.brickCount();
-  made.nonFiniteReplaced = source.nonFiniteReplaced;
-  made.inactive = source.inactive;
-  const StoredGrid* const previous = previousOf(g);
-  const GridBefore* const before = expected ? nullptr : recordOf(previous);
-  if (!expected && isAsBefore(previous, source, made.key)) {
-    made.asBefore = true;
-    made.conversion.grid = *previous;
-    made.conversion.compact = before->compact;
-    made.conversion.grid.descriptor = source.descriptor;
-    made.conversion.grid.reference.reset();  // it may name another grid of this file
-    return made;
-  }
-  ConvertOptions options = options_.convert;
-  options.fit = fit;
-  options.goal = resolvedGoal(g, source);
-  if (!asVoxels_.empty() && asVoxels_[g]) options.representation = Representation::kVoxels;
-  options.previous = expected ? expected : previous;
-  if (before) options.previousCompact = before->compact;
-  if (expected) options.keepsPastErrors = false;  // those of another grid are not worth it
-  if (scales_[g].peak) options.fit.peak = scales_[g].peak;
-  if (grids_[g].component) options.measure = Measure::kValues;
-  if (needsExactSet(g, source)) options.storage.activity = Activity::kExact;
-  const ConvertInput input{source.descriptor, source.volume};
-  if (!options_.paper) {
-    made.conversion = convertVolume(input, options);
-    return made;
-  }
-  PaperConversion byPaper = convertByPaper(input, {options.fit, *options_.paper}, options.storage);
-  made.conversion = std::move(byPaper.conversion);
-  made.paper = std::move(byPaper.record);
-  return made;
-}
-
-}  // namespace encode
 
 namespace {
 
 using encode::GridConverter;
+using encode::isSmall;
 using encode::RootSearch;
 
 // Grids of equal voxels.
@@ -591,7 +303,7 @@ class SizeSearch {
         betterAsVoxels_(source.grids.size(), std::numeric_limits<double>::infinity()) {}
 
   ConvertedFile run() {
-    const double size = double(*options_.size), first = options_.previous.quality;
+    const double size = double(*options_.size), first = options_.previous.abovePreset;
     RootSearch search({kLeast, kMost, kNarrowest, kLongest, true}, std::log2(kAimedShare * size),
                       kOctavesPerDb, first);
     double before = 0.0;
@@ -608,7 +320,7 @@ class SizeSearch {
       search.learn(std::log2(bytes));
     }
     const bool isCancelled = converter_.isCancelled();
-    if (!best_ && isCancelled) best_.emplace();
+    if (!best_ && isCancelled) best_ = std::move(smallest_);
     if (!best_)
       throw UsageError("the smallest file that was found takes " + std::to_string(*fewest_) +
                        " bytes; the size allows " + std::to_string(*options_.size) +
@@ -639,27 +351,34 @@ class SizeSearch {
 
   /// Converts the file with a quality, and keeps it if it is the best one that keeps to the size.
   /// \return its bytes
-  std::uint64_t tryQuality(double more) {
+  std::uint64_t tryQuality(double abovePreset) {
     std::vector<bool> asVoxels(betterAsVoxels_.size());
-    for (std::size_t g = 0; g < asVoxels.size(); ++g) asVoxels[g] = more >= betterAsVoxels_[g];
-    converter_.tryGoal(PresetGoal{more}, std::move(asVoxels));
+    for (std::size_t g = 0; g < asVoxels.size(); ++g)
+      asVoxels[g] = abovePreset >= betterAsVoxels_[g];
+    converter_.tryGoal(PresetGoal{abovePreset}, std::move(asVoxels));
     ConvertedFile made = convertOnce(source_, options_, converter_, twins_);
     const std::uint64_t bytes = bytesOf(made.file);
-    fewest_ = std::min(fewest_.value_or(bytes), bytes);
-    for (const GridConversion& grid : made.grids) learnFrom(grid, more);
-    const bool isWorse = best_ && (made.interrupted || best_->quality >= more);
-    if (bytes > *options_.size || isWorse) return bytes;
-    made.quality = more;
-    best_ = std::move(made);
+    if (!made.interrupted) fewest_ = std::min(fewest_.value_or(bytes), bytes);
+    for (const GridConversion& grid : made.grids) learnFrom(grid, abovePreset);
+    made.abovePreset = abovePreset;
+    made.isTooLarge = bytes > *options_.size;
+    if (!best_ && made.isTooLarge) {
+      if (!smallest_ || (!made.interrupted && bytes == *fewest_)) smallest_ = std::move(made);
+      return bytes;
+    }
+    // Grids that are missing are worse than a file that is too large.
+    const bool isWorse =
+        (best_ && best_->abovePreset >= abovePreset) || (made.interrupted && (best_ || smallest_));
+    if (!made.isTooLarge && !isWorse) best_ = std::move(made), smallest_.reset();
     return bytes;
   }
 
   /// Where voxels are better than ellipsoids, they are at any higher quality.
-  void learnFrom(const GridConversion& grid, double more) {
+  void learnFrom(const GridConversion& grid, double abovePreset) {
     seconds_[grid.source] += grid.secondsConvert;
     const auto& choice = grid.conversion.choice;
     if (grid.conversion.grid.voxels && choice && choice->ellipsoids)
-      betterAsVoxels_[grid.source] = std::min(betterAsVoxels_[grid.source], more);
+      betterAsVoxels_[grid.source] = std::min(betterAsVoxels_[grid.source], abovePreset);
   }
 
   [[nodiscard]] std::uint64_t bytesOf(const EsvrFile& file) const {
@@ -672,10 +391,12 @@ class SizeSearch {
   const FileOptions& options_;
   GridConverter& converter_;
   const Twins& twins_;
-  std::optional<ConvertedFile> best_;
+  std::optional<ConvertedFile> best_;      ///< of those that keep to the size
+  std::optional<ConvertedFile> smallest_;  ///< as long as none does
   std::optional<std::uint64_t> fewest_;
-  std::vector<double> seconds_;         ///< time that all conversions of each grid took
-  std::vector<double> betterAsVoxels_;  ///< quality from which on each grid is better as voxels
+  std::vector<double> seconds_;  ///< time that all conversions of each grid took
+  std::vector<double>
+      betterAsVoxels_;  ///< PresetGoal::abovePreset from which on each grid is better as voxels
 };
 
 /// Converts the grids to a file of at most a size.
@@ -686,7 +407,7 @@ ConvertedFile convertToSize(const FileSource& source, const FileOptions& options
     return SizeSearch(source, options, converter, twins).run();
   converter.setGoal(SizeGoal{*options.size - beside});
   ConvertedFile made = convertOnce(source, options, converter, twins);
-  if (!made.grids.empty()) made.quality = made.grids.front().conversion.more;
+  if (!made.grids.empty()) made.abovePreset = made.grids.front().conversion.abovePreset;
   return made;
 }
 

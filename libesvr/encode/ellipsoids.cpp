@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 #include <vector>
 
@@ -11,134 +10,8 @@
 #include "esvr/grid_coding.h"
 #include "esvr/metrics.h"
 #include "esvr/resolution.h"
-#include "format/section_table.h"
 
 namespace esvr::encode {
-
-namespace {
-
-/// Share of the active voxels with an extreme value from which on a volume saturates.
-constexpr double kSaturatedShare = 0.05;
-
-}  // namespace
-
-bool saturates(const SparseVolume& volume) {
-  const ValueRange range = activeRange(volume);
-  const auto isExtreme = [&](float v) {
-    return (v == range.max && v > volume.background) || (v == range.min && v < volume.background);
-  };
-  using Range = tbb::blocked_range<std::size_t>;
-  const auto extreme = parallelReduce(
-      Range(0, volume.brickCount()), std::uint64_t{0},
-      [&](const Range& bricks, std::uint64_t count) {
-        for (std::size_t b = bricks.begin(); b != bricks.end(); ++b)
-          for (int v = 0; v < kBrickVoxels; ++v)
-            count += isExtreme(volume.brickValues(b)[std::size_t(v)]) && volume.active[b].test(v);
-        return count;
-      },
-      std::plus<>());
-  return double(extreme) >= kSaturatedShare * double(activeVoxelCount(volume));
-}
-
-// ---- The stored grid of a fit
-
-namespace {
-
-/// PSNR of the sum over the box at the end of a fit, as the device of the fit measures it.
-double lastPsnr(const FitResult& fit) { return fit.curve.empty() ? 0.0 : fit.curve.back().psnrBox; }
-
-/// Rows for the errors of the layers of a judged grid, which are measured when everything else is done
-/// (measureLayers). Their bytes count before.
-void reserveLayerErrors(const Job& job, StoredGrid& grid) {
-  if (!job.judge) return;
-  const std::size_t layers = layerCount(grid);
-  grid.layerErrors.assign(layers > 1 ? layers : 0, {});
-}
-
-/// Compacts a grid: quickly (CompactOptions::quick) if the fit was cancelled, or if the conversion is
-/// cancelled meanwhile. Rate control passes over the whole volume on the device of the fit, or on the
-/// CPU if the fit was divided into chunks, because the volume may not fit into the GPU's memory.
-/// \param round  makes the result; its argument is the target with the box, the peak and the device of the job
-template <class Round>
-CompactResult roundedBy(const Job& job, const StoredGrid& grid, const FitResult& fit,
-                        CompactOptions target, const Round& round) {
-  const FitOptions& wanted = job.options.fit;
-  if (job.judge) target.layerErrors = false;
-  target.box = wanted.box;
-  target.peak = wanted.peak;
-  target.device = fit.chunks > 1 ? Device{} : wanted.device;
-  auto found = unlessCancelled([&]() -> std::optional<CompactResult> {
-    if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return round(target);
-  });
-  if (!found) {
-    const BestSoFar completion;
-    target.quick = true;
-    found = compactGrid(grid, job.input.source, target);
-  }
-  reserveLayerErrors(job, found->grid);
-  return std::move(*found);
-}
-
-CompactResult compactedTo(const Job& job, const StoredGrid& grid, const FitResult& fit,
-                          const CompactOptions& target) {
-  return roundedBy(job, grid, fit, target, [&](const CompactOptions& options) {
-    return compactGrid(grid, job.input.source, options);
-  });
-}
-
-Conversion conversionOf(FitResult fit, CompactResult compact) {
-  Conversion conversion;
-  conversion.grid = std::move(compact.grid);
-  conversion.fit = std::move(fit);
-  conversion.compact = CompactRecord{compact.loss, compact.steps};
-  return conversion;
-}
-
-}  // namespace
-
-StoredGrid storedGridOf(const Job& job, FitResult& fit) {
-  const auto made = [&](Activity activity) {
-    return makeStoredGrid(job.input.descriptor, job.input.source, fit.field, activity);
-  };
-  const Activity wanted = job.options.storage.activity;
-  auto grid = unlessCancelled([&]() -> std::optional<StoredGrid> {
-    if (fit.end == FitEnd::kCancelled) return std::nullopt;
-    return made(wanted);
-  });
-  if (!grid) {
-    const BestSoFar completion;
-    fit.end = FitEnd::kCancelled;
-    grid = made(wanted);
-  }
-  fit.field = {};
-  return std::move(*grid);
-}
-
-Conversion storedAs(const Job& job, FitResult fit, StoredGrid grid, const CompactOptions& target) {
-  if (job.options.storage.form == Storage::kFloat32) {
-    Conversion conversion;
-    conversion.fit = std::move(fit);
-    conversion.grid = std::move(grid);
-    return conversion;
-  }
-  CompactResult compact = compactedTo(job, grid, fit, target);
-  return conversionOf(std::move(fit), std::move(compact));
-}
-
-double psnrOf(const Job& job, const Conversion& conversion) {
-  const auto measured = unlessCancelled([&]() -> std::optional<double> {
-    if (isCancelled(job)) return std::nullopt;
-    return psnrOf(job, conversion.grid);
-  });
-  if (measured) return *measured;
-  return lastPsnr(conversion.fit) - (conversion.compact ? conversion.compact->loss : 0.0);
-}
-
-std::uint64_t bytesOfEllipsoids(const StoredGrid& grid) {
-  const BestSoFar completion;
-  return bytesAdded(grid);
-}
 
 // ---- Fits
 
@@ -166,6 +39,14 @@ constexpr double kSignsGain = 0.5;
 // one that continues the frame before (Lab, "Frames that continue"), and one from seeds for a size, unless many voxels
 // saturate.
 constexpr double kContinuedShare = 0.4, kContinuedFrameShare = 0.3, kSizedShare = 0.6;
+
+/// The share of the iterations of a whole fit for which a probe continues a short one, the factor of the iterations of short
+/// fits from which on there is one, and the growth of the quality in whole fits relative to short ones (Lab, "Probes").
+constexpr double kProbeShare = 0.17, kSteeperWhenProbed = 1.25;
+constexpr std::uint32_t kLongFit = 8;
+/// The share of the iterations of Preset::kHigh that its whole fits have: 3000 ellipsoids of the plume of 256 have 47.9, 50.3, 51.3
+/// and 51.5 dB of what is seen after 100, 400, 1000 and 2000.
+constexpr double kShareOfLongFit = 0.6;
 
 /// Bytes of ellipsoids from which on a whole fit has all iterations. It saves about a fifth of the bytes of a short one,
 /// which for fewer bytes is worth less time in proportion (hydrogen_atom: 560 bytes in 12 CPU seconds with all iterations).
@@ -205,10 +86,8 @@ constexpr double kMaxGrowth = 8.0, kGrowthAfterMiss = 1.03;
 /// Fits of fewer ellipsoids take little time, and one more or less decides.
 constexpr double kVoxelsOfAverages = 800.0, kFewestOfAverages = 200.0, kMostOfAveraging = 0.5;
 constexpr std::uint32_t kMostIterationsOfAverages = 1000;
-/// Smallest growth of the bytes per ellipsoid from a fit for a size to the next, and the fits after which a size is given
-/// up.
-constexpr double kMoreEach = 1.25;
-constexpr int kFitsUntilOneIsSmall = 5;
+/// Bytes of the residual of the signs of a narrow band with a whole fit, relative to those with a short one (Lab, "Signs of a size").
+constexpr double kSignsOfWholeFit = 0.75;
 /// Limits of the loss by rounding for a judge, dB over the box.
 constexpr double kLeastLoss = 0.02, kMostRoundingLoss = 5.0;
 /// Factor by which a whole fit of tones may be expected to gain more than one of 400 iterations over one of 100.
@@ -220,8 +99,6 @@ constexpr Margin kFloat32Margin{0.3, 0.0, 0.9};
 // Of twelve first fits that were 1.9 to 3.1 dB above their PSNR, those up to 2.3 dB were rounded to fewer bytes than a
 // second fit took, or to at most 6 % more, and those above 2.8 dB to 7 to 38 % more.
 Margin compactMargin(double usualLoss) { return {usualLoss, 0.39 * usualLoss, 2.5 * usualLoss}; }
-
-double countOf(const Attempt& a) { return double(std::max<std::size_t>(a.count(), 1)); }
 
 FitPoint pointOf(const Attempt& a) { return {double(a.asked), a.psnr}; }
 
@@ -277,48 +154,6 @@ void EllipsoidSearch::stayBelow(std::uint64_t bytes) {
 
 namespace {
 
-FitOptions optionsFor(const Job& job, double count, std::uint32_t iterations) {
-  FitOptions options = job.options.fit;
-  const double most = double(std::max<std::uint64_t>(activeVoxelCount(job.input.source), 1));
-  options.count = std::size_t(std::clamp(std::floor(count), 1.0, most));
-  options.psnr.reset();
-  options.seconds.reset();
-  options.iterations = iterations;
-  return options;
-}
-
-/// A fit to the input of a job, or to its averages. Its field and that of options.start are among the voxels of the input.
-FitResult fitted(const Job& job, FitOptions options) {
-  if (!job.averages) return fit(job.input.source, options);
-  Field start;
-  if (options.start) start = amongOtherVoxels(*options.start, kAveraged), options.start = &start;
-  if (!options.peak) options.peak = peakOf(job.input.source);
-  FitResult made = fit(*job.averages, options);
-  made.field = amongOtherVoxels(std::move(made.field), 1.0 / kAveraged);
-  return made;
-}
-
-Attempt attempted(const Job& job, const FitOptions& options) {
-  Attempt result;
-  result.asked = *options.count;
-  result.fit = fitted(job, options);
-  result.grid = storedGridOf(job, result.fit);
-  const SparseVolume& source = job.input.source;
-  const auto judged = unlessCancelled([&]() -> std::optional<Judge::Judgement> {
-    if (result.cancelled()) return std::nullopt;
-    SparseVolume decoded = decodeGrid(result.grid, {.memory = memoryOf(source)});
-    if (job.averages)
-      result.psnrOfVoxels =
-          psnrOverBox(source, decoded, {.peak = options.peak ? *options.peak : peakOf(source)});
-    if (!job.judge) return Judge::Judgement{psnrOf(job, std::move(decoded))};
-    return (*job.judge)(std::move(decoded));
-  });
-  if (!judged) result.fit.end = FitEnd::kCancelled;
-  result.psnr = judged ? judged->quality : lastPsnr(result.fit);
-  result.forTones = judged ? judged->forTones : 0.0;
-  return result;
-}
-
 /// The number of ellipsoids of the first short fit for a size, and for a PSNR.
 double firstCount(const Job& job) {
   if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
@@ -328,10 +163,6 @@ double firstCount(const Job& job) {
 }
 
 }  // namespace
-
-Attempt shortFitOf(const Job& job, double count) {
-  return attempted(job, optionsFor(job, count, planOf(job).shortIterations));
-}
 
 double scoutCount(const Job& job) {
   const double most = std::clamp(double(job.input.source.brickCount()) / kBricksOfScout,
@@ -348,10 +179,12 @@ Attempt EllipsoidSearch::shortFit(double count) const {
 const Attempt* EllipsoidSearch::startFor(double count) const {
   const Attempt* start = nullptr;
   const auto distance = [&](const Attempt& a) { return std::abs(std::log(countOf(a) / count)); };
+  // Ellipsoids that are left where others were dropped have more wrong signs than those from seeds.
+  const double least = signs_ > 0 ? 1.0 : kLeastGrowth;
   const auto consider = [&](const Attempt& a) {
     const double growth = count / countOf(a);
     // What filled the memory of a GPU would have no room to begin with.
-    if (a.cancelled() || a.fit.deviceFull || growth < kLeastGrowth || growth > kMostGrowth) return;
+    if (a.cancelled() || a.fit.deviceFull || growth < least || growth > kMostGrowth) return;
     if (!start || distance(a) <= distance(*start)) start = &a;
   };
   // Where many voxels saturate, a continued fit is worse (dragon: 46.8 dB instead of 48.1).
@@ -447,7 +280,7 @@ std::optional<double> EllipsoidSearch::scoutedBytes() const {
 
 /// Quality of a whole fit less that of a short one, dB.
 double EllipsoidSearch::behind() const {
-  if (before_) return 0.0;
+  if (before_ || isProbed_) return 0.0;
   const double whole = plan_.wholeIterations, brief = plan_.shortIterations;
   if (!isToned(job_)) {
     const double usual = saturates_ ? kShortFitBehindSaturated : kShortFitBehind;
@@ -657,19 +490,24 @@ void EllipsoidSearch::forecast() {
     price_ = double(bytesOfEllipsoids(*before_)) / double(before_->field.ellipsoidCount());
   } else {
     const bool isQuick = goal_.psnr.has_value();
-    const CompactResult compact =
+    CompactResult compact =
         compacted(*draft_, {.loss = rounding_.usualLoss, .layerErrors = false, .quick = isQuick});
     price_ = std::max(double(compact.bytes) / countOf(*draft_), 1.0) / kShortFitPrice;
-    const std::uint64_t padding = compact.grid.field.chunks.size() * (format::kAlignment - 1);
-    besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + padding;
+    addSigns(compact);
+    besides_ = bytesOfEllipsoids(compact.grid) - compact.bytes + paddingOf(compact) - signs_;
+    signs_ = std::uint64_t(kSignsOfWholeFit * double(signs_));
+    besides_ += signs_;
   }
   const double bytes =
       goal_.psnr ? price_ * countFor(drafted_, aim() - behind(), slope_) : double(*goal_.bytes);
   const double share = std::min(1.0, bytes / kBytesOfWholeFit);
   // Of a few ellipsoids, one more or less may miss a PSNR (hydrogen_atom with 40 dB), and fits are short.
   if (share <= 0.5) plan_.wholeFits = std::max(plan_.wholeFits, kMostSmallFits);
-  plan_.wholeIterations = std::max(std::min(plan_.shortIterations, plan_.wholeIterations),
-                                   std::uint32_t(share * plan_.wholeIterations));
+  plan_.probes = plan_.probes && goal_.psnr && share == 1.0 && !saturates_;
+  const bool isLong = plan_.probes && !options_.fit.iterations;
+  const double iterations = (isLong ? kShareOfLongFit : share) * plan_.wholeIterations;
+  plan_.wholeIterations =
+      std::max(std::min(plan_.shortIterations, plan_.wholeIterations), std::uint32_t(iterations));
   if (goal_.psnr)
     expectedBytes_ =
         std::uint64_t(double(besides_) + price_ * countFor(drafted_, aim() - behind(), slope_));
@@ -750,8 +588,27 @@ int EllipsoidSearch::mostWholeFits() const {
   return isFarAbove ? std::max(plan_.wholeFits, kMostSmallFits) : plan_.wholeFits;
 }
 
+/// True if whole fits have so many iterations that a short fit says little of them.
+bool EllipsoidSearch::mayProbe() const {
+  return plan_.probes && !isProbed_ && !before_ && !job_.averages && !draft_->cancelled() &&
+         plan_.wholeIterations >= kLongFit * plan_.shortIterations;
+}
+
+/// Continues the last short fit for a share of the iterations of a whole one, and forecasts from there. A whole fit with the
+/// number of ellipsoids that the short one asked for would take several times as long, and be far above the PSNR.
+void EllipsoidSearch::probe() {
+  auto made = unlessCancelled(
+      [&] { return std::optional(continued(draft_->grid, double(draft_->asked), kProbeShare)); });
+  if (!made) return;
+  draft_ = std::move(made);
+  drafted_ = {pointOf(*draft_)};
+  slope_ *= kSteeperWhenProbed;
+  isProbed_ = true;
+}
+
 /// A short fit that has all iterations of a whole one is the first of the whole fits.
 std::optional<Conversion> EllipsoidSearch::runToPsnr() {
+  if (mayProbe()) probe();
   if (!draft_->cancelled() && attempts_.empty() && plan_.wholeIterations <= plan_.shortIterations)
     attempts_.push_back(*draft_);
   for (int fits = 0; fits < mostWholeFits() && !draft_->cancelled() && !isEnough(); ++fits) {
@@ -803,70 +660,6 @@ Conversion EllipsoidSearch::smallestOrBest() {
       reached_ = before;
   }
   return std::move(*smallest);
-}
-
-/// Compacts an attempt to the bytes that the grid's other sections leave. These may be larger than those of the attempt
-/// before; the bytes are then divided again.
-/// \return nothing if the other sections take all bytes
-std::optional<CompactResult> EllipsoidSearch::filled(const Attempt& attempt) {
-  for (int n = 0;; ++n) {
-    if (besides_ >= *goal_.bytes) return std::nullopt;
-    CompactResult now = compacted(attempt, {.bytes = *goal_.bytes - besides_});
-    const std::uint64_t padding = now.grid.field.chunks.size() * (format::kAlignment - 1);
-    const std::uint64_t besides = bytesOfEllipsoids(now.grid) - now.bytes + padding;
-    if (n > 0 || besides <= besides_ + padding) {
-      needed_ = besides_ + now.bytes;
-      return now;
-    }
-    besides_ = besides;
-  }
-}
-
-/// As many ellipsoids as the size allows. Where they take more bytes than expected, or would lose too
-/// much by rounding, the fit is repeated with fewer.
-std::optional<Conversion> EllipsoidSearch::runToSize() {
-  std::optional<Conversion> best;
-  double quality = 0.0, each = price_;
-  const auto take = [&](Attempt attempt, CompactResult now) {
-    best = conversionOf(std::move(attempt.fit), std::move(now));
-  };
-  for (int fits = 0; fits < (best ? plan_.wholeFits : kFitsUntilOneIsSmall); ++fits) {
-    if (draft_->cancelled() || besides_ >= *goal_.bytes) break;
-    const double count = double(*goal_.bytes - besides_) / each;
-    auto attempt = unlessCancelled([&]() -> std::optional<Attempt> { return wholeFit(count); });
-    if (!attempt) {
-      draft_->fit.end = FitEnd::kCancelled;
-      break;
-    }
-    auto now = filled(*attempt);
-    if (!now) break;
-    const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= rounding_.mostLoss;
-    const bool isLast = attempt->cancelled() || (isSmall && isGood) || attempt->asked == 1;
-    if (!isLast)
-      each = std::max(
-          double(compacted(*attempt, {.loss = rounding_.usualLoss, .layerErrors = false}).bytes) /
-              countOf(*attempt),
-          kMoreEach * each);
-    attempts_.assign(1, *attempt);  // the next fit may continue it
-    if (isSmall) {
-      const double reached = completed(*attempt, *now);
-      if (!best || reached > quality) {
-        quality = reached;
-        if (job_.judge) reached_ = reached;
-        take(std::move(*attempt), std::move(*now));
-      }
-    }
-    if (isLast) break;
-  }
-  if (best || !draft_->cancelled()) return best;
-  // Nothing was found before the cancellation: the last fit is completed.
-  Attempt last = std::move(attempts_.empty() ? *draft_ : attempts_.front());
-  last.fit.end = FitEnd::kCancelled;
-  auto now = filled(last);
-  if (!now || needed_ > *goal_.bytes) throw Cancelled();
-  (void)completed(last, *now);
-  take(std::move(last), std::move(*now));
-  return best;
 }
 
 }  // namespace esvr::encode

@@ -6,8 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "encode/job.h"
-#include "encode/rate_control.h"
+#include "encode/attempt.h"
 
 namespace esvr::encode {
 
@@ -22,43 +21,8 @@ struct Rounding {
   double usualLoss, mostLoss, factor;
 };
 
-/// A fit, and its grid in float32.
-struct Attempt {
-  FitResult fit;          ///< its field was moved to the grid
-  StoredGrid grid;        ///< grid in float32
-  double psnr = 0.0;      ///< quality, dB
-  double forTones = 0.0;  ///< Judge::Judgement::forTones
-  /// PSNR over the box of the input, dB, if the fit is one to its averages, of which the fit's own PSNR is.
-  double psnrOfVoxels = 0.0;
-  std::size_t asked = 0;  ///< wanted number of ellipsoids; the grid may have fewer
-
-  [[nodiscard]] std::size_t count() const { return grid.field.ellipsoidCount(); }
-  [[nodiscard]] bool cancelled() const { return fit.end == FitEnd::kCancelled; }
-};
-
-/// A short fit, by itself.
-/// \param count  wanted number of ellipsoids
-[[nodiscard]] Attempt shortFitOf(const Job& job, double count);
-
 /// The number of ellipsoids of a short fit that shows what suits a job, before anything is known.
 [[nodiscard]] double scoutCount(const Job& job);
-
-/// Makes the stored grid of a fit, and takes its field. If the conversion is cancelled, active voxels
-/// are found by value, and the end of the fit becomes kCancelled.
-[[nodiscard]] StoredGrid storedGridOf(const Job& job, FitResult& fit);
-
-/// Makes a conversion of a fit and its grid in float32, in the form that the options want: compacted
-/// to the target unless the storage is kFloat32.
-/// \param target  its loss, psnr and bytes count; the rest follows from the job
-[[nodiscard]] Conversion storedAs(const Job& job, FitResult fit, StoredGrid grid,
-                                  const CompactOptions& target);
-
-/// The PSNR of a conversion over the box, dB: measured, or, if that is cancelled, what the fit and rate
-/// control have measured.
-[[nodiscard]] double psnrOf(const Job& job, const Conversion& conversion);
-
-/// bytesAdded() of a grid of ellipsoids, which takes little time, so that nothing cancels it.
-[[nodiscard]] std::uint64_t bytesOfEllipsoids(const StoredGrid& grid);
 
 /// dB by which the float32 grid should exceed a PSNR: the best value, and the limits within which the size
 /// hardly differs.
@@ -69,7 +33,7 @@ struct Margin {
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
 /// Plan::wholeFits whole fits are made (up to four if few ellipsoids suffice, or while each is far above the PSNR; for a size
 /// up to five, if the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
-/// decide about their signs, and one that shows that averages do not suffice. A frame of a sequence continues the ellipsoids
+/// decide about their signs, and one that shows that averages do not suffice. One of them is continued for Preset::kHigh (probe()). A frame of a sequence continues the ellipsoids
 /// of the frame before instead of making short fits.
 class EllipsoidSearch {
  public:
@@ -131,6 +95,8 @@ class EllipsoidSearch {
   [[nodiscard]] double countOfFrame(const StoredGrid& before) const;
   void continueFrame();
   void decideSigns();
+  [[nodiscard]] bool mayProbe() const;
+  void probe();
   void forecast();
 
   [[nodiscard]] double behind() const;
@@ -142,7 +108,10 @@ class EllipsoidSearch {
   [[nodiscard]] int mostWholeFits() const;
   [[nodiscard]] std::optional<Conversion> runToPsnr();
   [[nodiscard]] std::optional<Conversion> runToSize();
+  void addSigns(CompactResult& made);
+  [[nodiscard]] bool hasRoom() const;
   [[nodiscard]] std::optional<CompactResult> filled(const Attempt& attempt);
+  [[nodiscard]] std::optional<CompactResult> filledWithSigns(const Attempt& attempt);
   [[nodiscard]] Conversion smallestOrBest();
 
   ConvertOptions options_;
@@ -157,20 +126,18 @@ class EllipsoidSearch {
   Margin margin_;
   double slope_;               ///< growth of the quality by twice the ellipsoids, dB
   bool slopeIsKnown_ = false;  ///< from two short fits
+  bool isProbed_ = false;      ///< the last short fit was continued by probe()
   bool isTooLarge_ = false;    ///< the short fits showed that the grid cannot stay below `below_`
   std::uint64_t maxCount_;
   std::optional<Attempt> draft_;    ///< the last short fit
   std::vector<FitPoint> drafted_;   ///< all of them that are like it
   double price_ = kUsualBytesEach;  ///< expected bytes of an ellipsoid
   std::uint64_t besides_ = 0;       ///< bytes of the grid's other sections
+  std::uint64_t signs_ = 0;         ///< those of the residual of signs among them
   std::uint64_t expectedBytes_ = 0, needed_ = 0;
   std::vector<Attempt> attempts_;
   std::optional<double>
       reached_;  ///< the judged quality, dB, of the conversion that was made last or kept
 };
-
-/// True if many active voxels have an extreme value of the volume, so that both signs of intensities
-/// may be better.
-[[nodiscard]] bool saturates(const SparseVolume& volume);
 
 }  // namespace esvr::encode

@@ -1,12 +1,10 @@
-// From a volume and a goal to a stored grid. The chapter goes from inside out: goals that voxels and
-// ellipsoids can both reach, the other goals, what a stored grid promises, and convertVolume().
+// From a volume and a goal to a stored grid. The chapter goes from inside out: goals, what a stored grid promises, and
+// convertVolume(). choice.cpp has the goals that voxels and ellipsoids can both reach.
 
 #include "esvr/encode.h"
 
 #include <algorithm>
 #include <cmath>
-#include <future>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,6 +13,7 @@
 #include "core/add_seconds.h"
 #include "core/counted.h"
 #include "core/parallel.h"
+#include "encode/choice.h"
 #include "encode/ellipsoids.h"
 #include "encode/non_finite.h"
 #include "encode/signs.h"
@@ -29,293 +28,6 @@
 
 namespace esvr::encode {
 namespace {
-
-// ---- Voxels or ellipsoids
-
-/// Bytes that a fit on the CPU must be expected to save, compared with voxels, for each brick and iteration. These take 5 to
-/// 15 us, so that a fit saves at least some 200 bytes in each second. A fit saves 0.082 in smoke1, 0.009 in hydrogen_atom, 0.013
-/// in dragon, and 0.0008 in the shadow of gas_0006, where the fits took 30 s for 1.5 KB.
-constexpr double kBytesPerWork = 0.002;
-
-Candidate figuresOf(const VoxelCandidate& voxels) {
-  return {voxels.bytes, voxels.psnr, false, voxels.seconds};
-}
-
-/// A conversion to voxels.
-/// \param ellipsoids  the figures of ellipsoids that were considered instead
-Conversion asConversion(VoxelCandidate voxels, const std::optional<Candidate>& ellipsoids,
-                        FitEnd end) {
-  Conversion conversion;
-  conversion.choice = ChoiceRecord{figuresOf(voxels), ellipsoids};
-  conversion.grid = std::move(voxels.grid);
-  conversion.fit.end = end;
-  return conversion;
-}
-
-/// True if all active voxels have one value: exact voxels take hardly more than their mask.
-bool isConstant(const SparseVolume& volume) {
-  const ValueRange range = activeRange(volume);
-  return range.min == range.max;
-}
-
-/// Completes the ellipsoids or the voxels for a goal that both can reach, whichever are better.
-class Choice {
- public:
-  Choice(const Job& job, const Aim& goal)
-      : job_(job), wanted_(representationOf(job)), goal_(goal), plan_(planOf(job)) {}
-
-  /// \param share        share of the voxels' bytes that ellipsoids must be expected to stay below
-  /// \param smallEnough  bytes of voxels below which no ellipsoids are tried, unless they are far smaller
-  Conversion forPsnr(double share, std::uint64_t smallEnough) {
-    if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
-    if (isConstant(job_.input.source) || isBeyondFloats())
-      return asConversion(exactVoxels(job_), {}, FitEnd::kPsnrReached);
-    voxels_.emplace(job_, goal_);
-    if (wanted_ == Representation::kVoxels || *goal_.psnr > kMostOfSums) return completeVoxels();
-    if (!plan_.fitsInTime) {
-      fitsTookTooLong_ = true;
-      return completeVoxels();
-    }
-    ellipsoids_.emplace(job_, goal_);
-    const auto expected = estimateAndDraft(share, smallEnough);
-    if (isCancelled(job_)) return bestSoFar();
-    if (!ellipsoids_->drafted()) return completeVoxels();
-    // An estimate from a sample may be too low or too high.
-    const double margin = expected->estimated ? kEstimateMargin : 1.0;
-    const auto below = std::uint64_t(margin * share * double(expected->bytes));
-    figures_ = Candidate{ellipsoids_->expectedBytes(), *goal_.psnr, true, seconds_};
-    if (!ellipsoids_->mayStayBelow(below) ||
-        voxels_->likelyBytes(*expected) <
-            figures_->bytes + leastSaving(ellipsoids_->expectedWork()))
-      return completeVoxels();
-    completeEllipsoids();
-    const bool reached = conversion_ && *figures_->psnr >= *goal_.psnr;
-    if (reached && margin * double(figures_->bytes) < double(expected->bytes))
-      return ellipsoidsInsteadOf(expected);
-    if (isCancelled(job_)) return bestSoFar();
-    auto voxels = finishedVoxels();
-    if (!voxels || (reached && figures_->bytes < voxels->bytes))
-      return ellipsoidsInsteadOf(voxels ? figuresOf(*voxels) : expected);
-    return asConversion(std::move(*voxels), figures_, FitEnd::kPsnrReached);
-  }
-
-  Conversion forSize() {
-    if (wanted_ == Representation::kEllipsoids) return ellipsoidsAlone();
-    voxels_.emplace(job_, goal_);
-    if (wanted_ == Representation::kVoxels || exactFits()) return completeVoxels();
-    if (leavesOutFits(*goal_.bytes) && voxels_->estimate()) return completeVoxels();
-    fitsTookTooLong_ = false;
-    ellipsoids_.emplace(job_, goal_);
-    seconds_ += secondsOf([&] { ellipsoids_->draft(); });
-    figures_ = Candidate{*goal_.bytes, ellipsoids_->expectedPsnr(), true, seconds_};
-    std::optional<Candidate> expected, tooLarge;
-    (void)unlessCancelled([&] {
-      if (isCancelled(job_)) return false;
-      tooLarge = voxels_->tooLargeFor(ellipsoids_->expectedPsnr() - kUncertainty);
-      if (!tooLarge) expected = voxels_->estimate();
-      return true;
-    });
-    if (expected && !isCancelled(job_) && !ellipsoids_->mayReach(*expected->psnr))
-      if (auto voxels = finishedVoxels())
-        return asConversion(std::move(*voxels), figures_, FitEnd::kScheduleDone);
-    completeEllipsoids();
-    const bool isBetter =
-        conversion_ &&
-        (!expected || *figures_->psnr >= *expected->psnr + (expected->estimated ? kSampleDb : 0.0));
-    if (isBetter || (conversion_ && isCancelled(job_)))
-      return ellipsoidsInsteadOf(expected ? expected : tooLarge);
-    auto voxels = finishedVoxels();
-    if (!voxels && !conversion_) throw tooSmall(ellipsoids_->needed());
-    if (!voxels || (conversion_ && *figures_->psnr > voxels->psnr))
-      return ellipsoidsInsteadOf(voxels ? figuresOf(*voxels) : expected);
-    return asConversion(std::move(*voxels), figures_, FitEnd::kScheduleDone);
-  }
-
- private:
-  /// dB by which the PSNR of voxels of a size may be higher than on a sample, whose runs have fewer
-  /// neighbours and whose models learn less.
-  static constexpr double kSampleDb = 3.0;
-  /// PSNR, dB, that sums of ellipsoids in float32 do not reach.
-  static constexpr double kMostOfSums = 110.0;
-  /// Smallest number of active voxels from which on a GPU makes the short fits while the CPU tries
-  /// voxels. Those of smaller volumes are soon tried, and often show that no fit is needed.
-  static constexpr std::uint64_t kMinDraftedVoxels = std::uint64_t{1} << 16;
-
-  /// True if only exact voxels have the PSNR: steps of the floats next to the peak have less.
-  [[nodiscard]] bool isBeyondFloats() const {
-    constexpr double kMostOfFloats = 156.0;
-    return *goal_.psnr > kMostOfFloats && !seesPictures(job_);
-  }
-
-  /// Bytes that a fit of so much work must save to be worth its time, which on a GPU is short.
-  std::uint64_t leastSaving(double work) const {
-    if (isOnGpu()) return 0;
-    return std::uint64_t(kBytesPerWork * work / effortFactor(job_.options.effort));
-  }
-
-  /// Whether no fit is made beside voxels of so many bytes, because it would take too long for the effort. The least effort
-  /// makes none where voxels need many bits, because ellipsoids do, too: for the sizes of external_points.md, they were
-  /// better up to 2.0 bits for each active voxel, and worse from 3.6 on. For a quality, voxels of more than 1.25 bits cost
-  /// nothing but bytes, and a fit takes up to ten times as long.
-  bool leavesOutFits(std::uint64_t voxelBytes) {
-    constexpr double kBitsForSize = 2.0, kBitsForQuality = 1.25;
-    const double bits = (goal_.bytes ? kBitsForSize : kBitsForQuality) *
-                        double(activeVoxelCount(job_.input.source));
-    const bool isDetailed = job_.options.effort == kLeastEffort && 8.0 * double(voxelBytes) > bits;
-    fitsTookTooLong_ = !plan_.fitsInTime || isDetailed;
-    return fitsTookTooLong_;
-  }
-
-  bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
-
-  UsageError tooSmall(std::uint64_t needed) const {
-    const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
-                                         : "has no voxels of that size";
-    return UsageError("grid '" + shownName(job_.input.descriptor.name) + "' " + takes +
-                      "; the size allows " + std::to_string(*goal_.bytes));
-  }
-
-  Conversion ellipsoidsAlone() {
-    ellipsoids_.emplace(job_, goal_);
-    ellipsoids_->draft();
-    auto made = ellipsoids_->run();
-    if (!made) throw tooSmall(ellipsoids_->needed());
-    return std::move(*made);
-  }
-
-  bool exactFits() {
-    const Candidate exact = estimateExactVoxels(job_);
-    const double margin = exact.estimated ? kEstimateMargin : 1.0;
-    return double(exact.bytes) * margin <= double(*goal_.bytes);
-  }
-
-  /// Tries voxels on a sample and makes the short fits: at the same time if a GPU makes these, and one
-  /// after the other otherwise, so that the fits know what they have to stay below.
-  std::optional<Candidate> estimateAndDraft(double share, std::uint64_t smallEnough) {
-    const bool onGpu = isOnGpu() && activeVoxelCount(job_.input.source) >= kMinDraftedVoxels;
-    std::optional<Candidate> expected;
-    const auto areSmallEnough = [&](const Candidate& voxels) {
-      return leavesOutFits(voxels.bytes) ||
-             (voxels.bytes < smallEnough && !voxels_->areFarBehind());
-    };
-    const auto draft = [&](const CancelToken* cancel) {
-      seconds_ += secondsOf([&] {
-        (void)unlessCancelled([&] {
-          ellipsoids_->draft(cancel);
-          return true;
-        });
-      });
-    };
-    const auto estimate = [&] {
-      return unlessCancelled([&] { return voxels_->estimate(ellipsoids_->scoutedBytes()); });
-    };
-    if (!onGpu) {
-      expected = estimate();
-      if (!expected || areSmallEnough(*expected)) return expected;
-      ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
-      draft(nullptr);
-      return expected;
-    }
-    CancelToken notNeeded(job_.options.fit.cancel);
-    auto trying = std::async(std::launch::async, [&, token = CancelScope::token()] {
-      const CancelScope scope(token);
-      auto found = estimate();
-      if (found && areSmallEnough(*found)) notNeeded.cancel();
-      return found;
-    });
-    draft(&notNeeded);
-    expected = trying.get();
-    if (expected) ellipsoids_->stayBelow(std::uint64_t(share * double(expected->bytes)));
-    return expected;
-  }
-
-  void completeEllipsoids() {
-    seconds_ +=
-        secondsOf([&] { conversion_ = unlessCancelled([&] { return ellipsoids_->run(); }); });
-    if (!conversion_) return;
-    const auto& reached = ellipsoids_->reached();
-    figures_ = Candidate{bytesOfEllipsoids(conversion_->grid),
-                         reached ? *reached : psnrOf(job_, *conversion_), false, seconds_};
-  }
-
-  std::optional<VoxelCandidate> finishedVoxels() {
-    return unlessCancelled([&] { return voxels_->run(); });
-  }
-
-  Conversion completeVoxels() {
-    auto voxels = voxels_->run();
-    if (!voxels) throw tooSmall(0);
-    Conversion conversion = asConversion(std::move(*voxels), figures_,
-                                         goal_.psnr ? FitEnd::kPsnrReached : FitEnd::kScheduleDone);
-    if (isCancelled(job_)) conversion.fit.end = FitEnd::kCancelled;
-    conversion.fitsTookTooLong = fitsTookTooLong_;
-    return conversion;
-  }
-
-  Conversion ellipsoidsInsteadOf(const std::optional<Candidate>& voxels) {
-    conversion_->choice = ChoiceRecord{voxels, figures_};
-    if (conversion_->choice->voxels) conversion_->choice->voxels->seconds = voxels_->seconds();
-    return std::move(*conversion_);
-  }
-
-  /// What was found before a cancellation: ellipsoids, or voxels that reach the goal.
-  Conversion bestSoFar() {
-    if (!conversion_ && ellipsoids_->hasDraft()) conversion_ = ellipsoids_->run();
-    if (conversion_) return std::move(*conversion_);
-    return completeVoxels();
-  }
-
-  const Job& job_;
-  Representation wanted_;
-  Aim goal_;
-  Plan plan_;
-  double seconds_ = 0.0;  ///< wall-clock seconds that all fits took together
-  bool fitsTookTooLong_ = false;
-  std::optional<VoxelSearch> voxels_;
-  std::optional<EllipsoidSearch> ellipsoids_;
-  std::optional<Conversion> conversion_;  ///< to ellipsoids
-  std::optional<Candidate> figures_;      ///< expected or measured figures of the ellipsoids
-};
-
-/// The result of a single fit, or exact voxels if they take no more bytes. No fit is made if its number
-/// of ellipsoids shows that it cannot be smaller.
-Conversion fitOrExact(const Job& job) {
-  FitOptions options = job.options.fit;
-  if (!options.iterations && job.options.effort != kUsualEffort)
-    options.iterations =
-        std::uint32_t(std::ceil(effortFactor(job.options.effort) * plannedIterations(options)));
-  double seconds = 0.0;
-  const auto fitted = [&] {
-    return addSeconds(seconds, [&] {
-      FitResult made = fit(job.input.source, options);
-      StoredGrid grid = storedGridOf(job, made);
-      grid.curve = withoutTimes(made.curve);
-      return storedAs(job, std::move(made), std::move(grid),
-                      {.loss = CompactOptions{}.loss, .psnr = options.psnr});
-    });
-  };
-  if (representationOf(job) != Representation::kAuto) return fitted();
-  const double count = double(plannedCount(options, activeVoxelCount(job.input.source)));
-  const Candidate expected = estimateExactVoxels(job);
-  std::optional<VoxelCandidate> exact;
-  const auto exactWithin = [&](double bytes) {
-    if (double(expected.bytes) > (expected.estimated ? kEstimateMargin : 1.0) * bytes) return false;
-    if (!exact) exact = unlessCancelled([&] { return std::optional(exactVoxels(job)); });
-    return exact && double(exact->bytes) <= bytes;
-  };
-  if (exactWithin(kLeastBytesEach * count))
-    return asConversion(std::move(*exact),
-                        Candidate{std::uint64_t(kUsualBytesEach * count), {}, true},
-                        FitEnd::kScheduleDone);
-  Conversion conversion = fitted();
-  if (isCancelled(job)) return conversion;
-  // Their PSNR would take a decoding.
-  const Candidate ellipsoids{bytesOfEllipsoids(conversion.grid), {}, false, seconds};
-  if (exactWithin(double(ellipsoids.bytes)))
-    return asConversion(std::move(*exact), ellipsoids, FitEnd::kScheduleDone);
-  conversion.choice = ChoiceRecord{exact ? figuresOf(*exact) : expected, ellipsoids};
-  return conversion;
-}
 
 // ---- Goals
 
@@ -340,8 +52,8 @@ bool isQuality(const Goal& goal) {
 PresetQuality presetQuality(const ConvertOptions& options) {
   PresetQuality quality = qualityOf(options.fit.preset);
   if (const auto* goal = std::get_if<PresetGoal>(&options.goal)) {
-    quality.psnr += goal->more, quality.picturePsnr += goal->more;
-    quality.surfaceBound *= std::pow(10.0, -goal->more / 20.0);
+    quality.psnr += goal->abovePreset, quality.picturePsnr += goal->abovePreset;
+    quality.surfaceBound *= std::pow(10.0, -goal->abovePreset / 20.0);
   }
   return quality;
 }
@@ -356,7 +68,7 @@ double wantedQuality(const Job& job) {
 }
 
 /// By how many dB the quality of a conversion is above that of the preset; 0 if it is not known.
-double moreThanPreset(const Job& job, const Conversion& made) {
+double abovePreset(const Job& job, const Conversion& made) {
   if (!made.choice) return 0.0;
   const auto& stored = made.grid.voxels ? made.choice->voxels : made.choice->ellipsoids;
   const bool isKnown = stored && stored->psnr && std::isfinite(*stored->psnr);
@@ -392,12 +104,12 @@ class Converter {
     const double most = double(activeVoxelCount(job_.input.source)) / kLeastVoxelsEach;
     options.fit.count = std::max<std::size_t>(std::size_t(most), 1);
     const Job job{job_.input, options, job_.judge, job_.scout};
-    return Choice(job, {.psnr = wantedQuality(job)}).forPsnr(kWorthwhileShare, kSmallEnough);
+    return convertToQuality(job, wantedQuality(job), {kWorthwhileShare, kSmallEnough});
   }
   Conversion operator()(const SizeGoal& goal) const {
     if (job_.options.storage.form != Storage::kCompact)
       throw UsageError("a size needs compact storage; the size of float32 storage is fixed");
-    return Choice(job_, {.bytes = goal.bytes}).forSize();
+    return convertToSize(job_, goal.bytes);
   }
   Conversion operator()(const PsnrGoal&) const { return forPsnr(); }
   Conversion operator()(const PictureGoal&) const { return forPsnr(); }
@@ -428,7 +140,7 @@ class Converter {
 
  private:
   [[nodiscard]] Conversion forPsnr() const {
-    return Choice(job_, {.psnr = wantedQuality(job_)}).forPsnr(1.0, kSmallForPsnr);
+    return convertToQuality(job_, wantedQuality(job_), {1.0, kSmallForPsnr});
   }
 
   [[nodiscard]] Conversion asVoxels(VoxelLayer layer) const {
@@ -777,7 +489,7 @@ std::optional<Conversion> convertBy(const ToneChoice& choice, const ConvertInput
                                    : layerErrorsOf(made->grid, given.source, judge->comparison());
   }
   made->byPictures = seesPictures(job);
-  if (std::holds_alternative<SizeGoal>(options.goal)) made->more = moreThanPreset(job, *made);
+  if (std::holds_alternative<SizeGoal>(options.goal)) made->abovePreset = abovePreset(job, *made);
   made->grid = throughTheFormat(std::move(made->grid), previous, memoryOf(given.source));
   requirePromises(job, made->grid);
   return made;

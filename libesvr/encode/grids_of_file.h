@@ -84,8 +84,11 @@ class GridConverter {
   std::vector<ActiveSet> sets_;  ///< the active voxels of the vectors of the file
 };
 
+/// True for a grid whose conversion keeps few threads busy: its voxels are coded in one or two blocks, each on one thread.
+[[nodiscard]] bool isSmall(const GridSource& grid);
+
 /// Calls body(i) for the numbers below `count` on at most so many threads, which begin in their order. None begins after
-/// the token is set or one has thrown; the first exception is thrown again. (convert_file.cpp)
+/// the token is set or one has thrown; the first exception is thrown again.
 void forEachAtOnce(std::size_t count, std::size_t threads,
                    const std::function<void(std::size_t)>& body);
 

@@ -106,6 +106,7 @@ Plan planOf(const Job& job) {
                std::clamp(plan.wholeIterations / 4, kLeastShortIterations, kMostShortIterations));
   plan.improves = inTime >= inAMinute || effort > kUsualEffort;
   plan.wholeFits = job.options.fit.preset == Preset::kHigh ? 3 : 2;
+  plan.probes = job.options.fit.preset == Preset::kHigh;
   return plan;
 }
 

@@ -84,8 +84,9 @@ inline constexpr std::uint32_t kMostShortIterations = 100;
 /// measured times, so that the result does not either.
 struct Plan {
   std::uint32_t wholeIterations = 0, shortIterations = 0;
-  int wholeFits = 2;       ///< largest number of whole fits, of which a continued one is one
-  bool improves = true;    ///< whether a whole fit for a PSNR may follow one that reaches it
+  int wholeFits = 2;     ///< largest number of whole fits, of which a continued one is one
+  bool probes = false;   ///< whether a longer short fit comes before the first whole one for a PSNR
+  bool improves = true;  ///< whether a whole fit for a PSNR may follow one that reaches it
   bool fitsInTime = true;  ///< false: a fit would take too long for the effort
 };
 [[nodiscard]] Plan planOf(const Job& job);

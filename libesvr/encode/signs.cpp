@@ -139,43 +139,22 @@ StoredGrid withSigns(StoredGrid grid, const SparseVolume& source) {
   return grid;
 }
 
+StoredGrid completedWithSigns(StoredGrid grid, const SparseVolume& source) {
+  if (auto made = unlessCancelled([&] { return std::optional(withSigns(grid, source)); }))
+    return std::move(*made);
+  const BestSoFar completion;  // without these signs, the ellipsoids of a band are of no use
+  return withSigns(std::move(grid), source);
+}
+
 // ---- Converting a band
 
 namespace {
 
-/// Conversions to a size: each one after the first leaves more room for the residual of the signs.
-constexpr int kMaxFitsForSize = 4;
-/// Factor of the room for the residual of the fit before. A smaller grid has more wrong signs.
-constexpr double kRoomFactor = 1.2;
-
 Conversion corrected(const Job& job, Conversion conversion) {
-  if (conversion.grid.voxels || conversion.grid.residual) return conversion;
-  auto grid =
-      unlessCancelled([&] { return std::optional(withSigns(conversion.grid, job.input.source)); });
-  if (!grid) {  // without these signs, the ellipsoids of a band are of no use
-    const BestSoFar completion;
-    grid = withSigns(std::move(conversion.grid), job.input.source);
-  }
-  conversion.grid = std::move(*grid);
+  // The ellipsoids of a size have their residual.
+  if (!conversion.grid.voxels && !conversion.grid.residual)
+    conversion.grid = completedWithSigns(std::move(conversion.grid), job.input.source);
   return conversion;
-}
-
-/// Ellipsoids with a residual that keep to a size: the conversion is repeated with fewer bytes until
-/// the residual fits in. \param made  a first conversion to the size
-std::optional<Conversion> withRoomForSigns(const Job& job, std::uint64_t bytes, Conversion made,
-                                           const ConvertTo& convertTo) {
-  ConvertOptions options = job.options;
-  options.representation = Representation::kEllipsoids;
-  std::uint64_t left = bytes;
-  for (int fits = 1; fits < kMaxFitsForSize; ++fits) {
-    const auto room = std::uint64_t(kRoomFactor * double(bytesAdded(made.grid) - left));
-    if (2 * room >= bytes) return std::nullopt;
-    left = bytes - room;
-    options.goal = SizeGoal{left};
-    made = corrected(job, convertTo({job.input, options}));
-    if (bytesAdded(made.grid) <= bytes) return made;
-  }
-  return std::nullopt;
 }
 
 Conversion bandAsVoxels(const Job& job, const ConvertTo& convertTo) {
@@ -184,31 +163,12 @@ Conversion bandAsVoxels(const Job& job, const ConvertTo& convertTo) {
   return convertTo({job.input, options});
 }
 
+/// True if the goal is a quality that voxels may have instead. Of a size, the better ones have been chosen.
 bool mayStoreVoxels(const Job& job) {
   return job.options.representation == Representation::kAuto &&
          job.options.storage.form == Storage::kCompact &&
-         !std::holds_alternative<FitGoal>(job.options.goal);
-}
-
-/// Voxels of a size, if there are any.
-std::optional<Conversion> bandAsVoxelsOfSize(const Job& job, const ConvertTo& convertTo) try {
-  return bandAsVoxels(job, convertTo);
-} catch (const UsageError&) {
-  return std::nullopt;
-}
-
-Conversion bandToSize(const Job& job, std::uint64_t bytes, const ConvertTo& convertTo) {
-  Conversion made = corrected(job, convertTo(job));
-  if (bytesOfEllipsoids(made.grid) <= bytes) return made;
-  if (auto fitted = withRoomForSigns(job, bytes, std::move(made), convertTo))
-    return std::move(*fitted);
-  const bool mayBeVoxels = mayStoreVoxels(job);
-  if (mayBeVoxels)
-    if (auto voxels = bandAsVoxelsOfSize(job, convertTo)) return std::move(*voxels);
-  throw UsageError("grid '" + shownName(job.input.descriptor.name) +
-                   "': ellipsoids and the residual that corrects the signs of the level set do not "
-                   "fit into " +
-                   std::to_string(bytes) + " bytes" + (mayBeVoxels ? ", and voxels neither" : ""));
+         !std::holds_alternative<FitGoal>(job.options.goal) &&
+         !std::holds_alternative<SizeGoal>(job.options.goal);
 }
 
 /// True if the voxels that were compared with the ellipsoids take fewer bytes than these and their
@@ -252,8 +212,6 @@ std::optional<double> changeAcrossSurface(const SparseVolume& volume) {
 }
 
 Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo) {
-  if (const auto* size = std::get_if<SizeGoal>(&job.options.goal))
-    return bandToSize(job, size->bytes, convertTo);
   Conversion made = corrected(job, convertTo(job));
   auto smaller = unlessCancelled([&]() -> std::optional<Conversion> {
     if (isCancelled(job) || !voxelsAreSmaller(job, made)) return std::nullopt;

@@ -12,12 +12,9 @@ namespace esvr::encode {
 /// Converts a job as if it were no narrow band.
 using ConvertTo = std::function<Conversion(const Job&)>;
 
-/// Converts a narrow band. Ellipsoids get a residual (withSigns) where a sign is wrong. For a SizeGoal,
-/// they are then converted again with fewer bytes, so that the residual fits in. With
-/// Representation::kAuto, voxels are stored if the residual makes ellipsoids larger than them or too
-/// large.
-/// \throws UsageError  ellipsoids and their residual do not fit into the size
-/// Other exceptions are those of `convertTo`.
+/// Converts a narrow band. Ellipsoids get a residual (withSigns) where a sign is wrong; for a SizeGoal, EllipsoidSearch
+/// leaves room for it. With Representation::kAuto, voxels are stored if the residual makes ellipsoids larger than them.
+/// Exceptions are those of `convertTo`.
 [[nodiscard]] Conversion convertNarrowBand(const Job& job, const ConvertTo& convertTo);
 
 /// The usual difference of two neighbours of which one is inside the surface and one is not: about the change of
@@ -32,6 +29,8 @@ using ConvertTo = std::function<Conversion(const Job&)>;
 /// \param grid  a narrow band without a residual that makeStoredGrid made from `source`
 /// \return the grid without a residual if no sign is wrong
 [[nodiscard]] StoredGrid withSigns(StoredGrid grid, const SparseVolume& source);
+/// The same for a grid that is not given up if the conversion is cancelled.
+[[nodiscard]] StoredGrid completedWithSigns(StoredGrid grid, const SparseVolume& source);
 
 /// Checks that a decoded narrow band has the signs of its source, in its bricks and elsewhere.
 /// \throws RuntimeFailure  a sign differs; the text names the grid and the voxel

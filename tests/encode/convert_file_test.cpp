@@ -220,7 +220,7 @@ TEST(ConvertGridsToSize, GivesGridsThatAreAlikeOneQualityAndTellsOfEachOnce) {
   EXPECT_GE(double(bytes), 0.9 * double(kSize));
   EXPECT_THAT(told, ElementsAre(0, 1, 2));
   EXPECT_TRUE(made.grids[1].shared && made.grids[1].shared->with == std::size_t{0});
-  const double wanted = kStandardPsnr + made.quality;
+  const double wanted = kStandardPsnr + made.abovePreset;
   for (std::size_t g = 0; g < 3; ++g) {
     const double psnr = activePsnrOf(file.grids[g].read().volume, made.file.grids[g]);
     EXPECT_GE(psnr, wanted) << g;
@@ -245,27 +245,34 @@ TEST(ConvertGridsToSize, BeginsWithTheQualityOfTheFrameBefore) {
   FileOptions options = fileOptions(PresetGoal{});
   options.size = kSize;
   const ConvertedFile first = convertGrids(frame(0), options);
-  options.previous = {&first.file, {}, first.quality};
+  options.previous = {&first.file, {}, first.abovePreset};
   const ConvertedFile second = convertGrids(frame(1), options);
   const auto bytes = encodeFrame(second.file, &first.file).size();
   EXPECT_LE(bytes, kSize);
   EXPECT_GE(double(bytes), 0.85 * double(kSize));
-  EXPECT_GE(second.quality, first.quality);
+  EXPECT_GE(second.abovePreset, first.abovePreset);
 }
 
-TEST(ConvertGridsToSize, LeavesNoGridsWhereItIsCancelledBeforeAFileKeepsToIt) {
-  CancelToken token;
-  FileOptions options = fileOptions(PresetGoal{});
-  options.size = 500;
-  options.convert.fit.cancel = &token;
-  options.onStep = [&](const GridStep& step) {
-    step.run();
-    token.cancel();
-  };
-  const ConvertedFile made = convertGrids(
-      fileOf({{"a", softBall({}, 1.0f, 16.0)}, {"b", softBall({3, 0, 0}, 1.0f)}}), options);
-  EXPECT_TRUE(made.interrupted);
-  EXPECT_LE(encodeEsvr(made.file).size(), 500u);
+TEST(ConvertGridsToSize, LeavesItsSmallestFileWhereItIsCancelledBeforeOneKeepsToIt) {
+  constexpr std::uint64_t kSize = 500;
+  const FileSource file =
+      fileOf({{"a", softBall({}, 1.0f, 16.0)}, {"b", softBall({3, 0, 0}, 1.0f)}});
+  for (const int stepsUntil : {1, 2, 3}) {  // in the first trial, at its end, and in the second one
+    CancelToken token;
+    FileOptions options = fileOptions(PresetGoal{});
+    options.size = kSize;
+    options.severalAtOnce = false;
+    options.convert.fit.cancel = &token;
+    int steps = 0;
+    options.onStep = [&](const GridStep& step) {
+      step.run();
+      if (++steps == stepsUntil) token.cancel();
+    };
+    const ConvertedFile made = convertGrids(file, options);
+    EXPECT_TRUE(made.interrupted);
+    EXPECT_EQ(made.grids.size(), stepsUntil == 1 ? 1u : 2u) << stepsUntil;
+    EXPECT_EQ(made.isTooLarge, encodeEsvr(made.file).size() > kSize);
+  }
 }
 
 /// Each ball is in a chunk of its own, and a twin has a row of the table for each of them.

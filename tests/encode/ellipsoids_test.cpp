@@ -79,6 +79,28 @@ TEST(EllipsoidSearch, MakesNoMoreWholeFitsThanItPromises) {
   EXPECT_LE(fits, encode::planOf({made.input, made.options}).wholeFits);
 }
 
+TEST(EllipsoidSearch, SlowProbesBeforeTheLongFitsOfTheHighPreset) {
+  for (const Preset preset : {Preset::kStandard, Preset::kHigh}) {
+    ConvertOptions options = ofIterations(800);
+    options.fit.preset = preset;
+    std::vector<std::uint32_t> lengths;  // of the whole fits, and of the probe before them
+    double last = 1.0;
+    options.fit.progress = [&](const FitProgress& progress) {
+      if (progress.fraction < last) lengths.push_back(0);
+      lengths.back() = progress.point.iteration;
+      last = progress.fraction;
+    };
+    Searched made(test::noiseVolume(3), options, {.psnr = 22.0});
+    made.search.draft();
+    lengths.clear(), last = 1.0;
+    EXPECT_EQ(made.search.run()->fit.end, FitEnd::kPsnrReached);
+    EXPECT_GT(made.search.expectedBytes(), 4096u) << "shorter fits do";
+    const bool isProbed = lengths.size() > 1 && lengths.front() < 200;
+    EXPECT_EQ(isProbed, preset == Preset::kHigh);
+    EXPECT_LE(lengths.size(), preset == Preset::kHigh ? 4u : 2u);
+  }
+}
+
 TEST(EllipsoidSearch, SlowFitsLargeEllipsoidsToAveragesWhereTheseSuffice) {
   constexpr double kWidth = 2.0;
   // Averages of blobs that are two voxels wide have errors that 40 dB allow and 52 dB do not.

@@ -131,7 +131,7 @@ struct GridBefore {
 struct FrameBefore {
   const EsvrFile* file = nullptr;       ///< null: there is none
   std::span<const GridBefore> grids{};  ///< those of the file, in their order
-  double quality = 0.0;                 ///< ConvertedFile::quality
+  double abovePreset = 0.0;             ///< ConvertedFile::abovePreset
 };
 
 struct FileOptions {
@@ -139,7 +139,7 @@ struct FileOptions {
   /// for a file.
   ConvertOptions convert{.goal = PresetGoal{}};
   /// Largest size of the file, bytes, which replaces all goals. A file of one grid has a SizeGoal. The grids of
-  /// other files, and of frames with a frame before them, have the highest PresetGoal::more with which the file is
+  /// other files, and of frames with a frame before them, have the highest PresetGoal::abovePreset with which the file is
   /// not larger, of some conversions that come near to the size. A file without grids has no size.
   std::optional<std::uint64_t> size{};
   bool shares =
@@ -167,13 +167,15 @@ struct ConvertedFile {
   std::vector<CarriedVector> carriedVectors;
   /// The conversion was cancelled; grids and vectors that were not complete are left out.
   bool interrupted = false;
-  bool isShared = false;  ///< the grids were compared with each other
-  double quality = 0.0;   ///< PresetGoal::more of grids that keep to a size, about
+  /// It was cancelled before a file was found that keeps to the size; this is the smallest one so far.
+  bool isTooLarge = false;
+  bool isShared = false;     ///< the grids were compared with each other
+  double abovePreset = 0.0;  ///< PresetGoal::abovePreset of grids that keep to a size, about
 };
 
 /// Converts the grids of a file. The result is as deterministic as convertVolume(). A cancelled call
-/// (FitOptions::cancel, or the token of the thread) returns the grids that are complete; none where no file was found
-/// that keeps to the size.
+/// (FitOptions::cancel, or the token of the thread) returns the grids that are complete; of a size, those of
+/// the best file that keeps to it, or else of the smallest one (ConvertedFile::isTooLarge).
 /// \throws UsageError  no file of the size was found; as for convertVolume
 /// \throws  what the sources throw, and as for convertVolume
 [[nodiscard]] ConvertedFile convertGrids(FileSource source, const FileOptions& options = {});

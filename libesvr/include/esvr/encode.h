@@ -38,12 +38,13 @@ struct FitGoal {
 /// as high. FitOptions::count, psnr and seconds are ignored.
 struct PresetGoal {
   /// dB above the quality of the preset. Every 6.02 dB halve the bound of a surface.
-  double more = 0.0;
+  double abovePreset = 0.0;
   friend auto operator<=>(const PresetGoal&, const PresetGoal&) = default;
 };
 
 /// The best grid that adds at most `bytes` to a file (bytesAdded). Ellipsoids use at least 98 % of
-/// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid.
+/// these bytes, less 7 for the padding of each chunk, unless more bytes would not improve the grid; with the signs of a
+/// narrow band, usually 95 %.
 /// FitOptions::count, psnr and seconds are ignored.
 struct SizeGoal {
   std::uint64_t bytes = 0;
@@ -224,8 +225,8 @@ struct Conversion {
   /// True if the goal was measured by what is seen (Measure::kAuto, PictureGoal). The figures of candidates
   /// in dB then are those of this measure.
   bool byPictures = false;
-  /// With a SizeGoal, about the PresetGoal::more of the same quality; 0 if it is not known.
-  double more = 0.0;
+  /// With a SizeGoal, about the PresetGoal::abovePreset of the same quality; 0 if it is not known.
+  double abovePreset = 0.0;
   /// The bound on the errors of a level set that was judged by its surface, value units.
   std::optional<double> surfaceBound{};
   /// True if ellipsoids were not tried because fitting them would take longer than the effort allows.
