@@ -5,7 +5,8 @@
 /// A goal states a condition for the stored grid. A conversion makes at most two whole fits to reach it
 /// (three for Preset::kHigh and above the usual effort; four of at most half the length where ellipsoids take
 /// less than 2 KB; for a size up to five, until one keeps to it), and at most six short ones, which forecast
-/// them, besides two that choose a tone curve.
+/// them, besides two that choose a tone curve. For Preset::kHigh, one of the short ones is continued for a sixth of the
+/// iterations of a whole one.
 
 #include <compare>
 #include <cstddef>
