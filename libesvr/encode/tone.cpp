@@ -334,7 +334,7 @@ ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options) 
     return {previous->tone};
   if (!Judge::seesPictures(input, options)) return {};
   const ToneCurve likely = likelyTone(input.source);
-  if (!likely.isOn() || options.effort == kLeastEffort) return {likely};
+  if (!likely.isOn()) return {};
   const auto choice =
       unlessCancelled([&] { return std::optional(chosenByFits(likely, input, options)); });
   return choice.value_or(ToneChoice{});
