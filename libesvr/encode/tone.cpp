@@ -335,6 +335,10 @@ ToneChoice chooseTone(const ConvertInput& input, const ConvertOptions& options) 
   if (!Judge::seesPictures(input, options)) return {};
   const ToneCurve likely = likelyTone(input.source);
   if (!likely.isOn()) return {};
+  // At the least effort, two short fits would take longer than all else: 0.11 instead of 0.05 s for the density of gas_0004.
+  constexpr std::uint64_t kSmallVolume = std::uint64_t{1} << 16;
+  if (options.effort == kLeastEffort && activeVoxelCount(input.source) < kSmallVolume)
+    return {likely};
   const auto choice =
       unlessCancelled([&] { return std::optional(chosenByFits(likely, input, options)); });
   return choice.value_or(ToneChoice{});
