@@ -185,7 +185,7 @@ bool writesNano(const Options& options) { return options.output.extension() == "
 std::string whyNot(const EsvrFile& file, const GridOfFile& grid, const Options& options) {
   if (!grid.isCarried) return "";
   if (changesResolution(options))
-    return "--coarsen and --voxel-size cannot resample a carried grid";
+    return "it is carried unchanged, and has no voxels of another size";
   if (!readsAll(options)) return "--lod, --max-ellipsoids and --bbox cannot cut a carried grid";
   return writesNano(options) ? whyNotNano(&file.carried[grid.index]) : "";
 }
@@ -320,6 +320,21 @@ DecodeOptions decodingOf(const EsvrFile& file, const Options& options) {
   decode.maxBytes = options.memory.maxBytes - std::min(options.memory.maxBytes, contentBytes(file));
   decode.memory = options.memory.voxels;
   return decode;
+}
+
+/// Whether carried grids get coarser voxels. With finer ones, voxels have no values between them.
+bool coarsensCarried(const Options& options, const EsvrFile& file) {
+  const Resolution& wish = options.resolution;
+  if (file.carried.empty() || !readsAll(options)) return false;
+  if (!wish.voxelSize) return wish.isAuto || wish.factor > 1.0;
+  return !file.grids.empty() && std::ranges::all_of(file.grids, [&](const StoredGrid& grid) {
+    return factorOf(wish, grid.descriptor) >= 1.0;
+  });
+}
+
+ReadOptions readingCarried(const EsvrFile& file, const Options& options) {
+  const DecodeOptions decode = decodingOf(file, options);
+  return {.maxBytes = decode.maxBytes, .memory = decode.memory};
 }
 
 /// The grids that are not carried, in order.
@@ -488,16 +503,24 @@ void convertFile(const Options& options, const CancelToken& cancel, const cli::L
 
 void convertContent(const Options& given, const Content& content, const CancelToken& cancel,
                     const cli::Log& log, std::ostream& out) {
-  const EsvrFile& file = content.file;
-  if (writesSplats(given)) return exportSplats(given, file, log);
-  const auto wanted = chooseGrids(given.input, file, given.grids);
+  if (writesSplats(given)) return exportSplats(given, content.file, log);
   Options options = given;
-  // Carried grids are left out only where the resolution does change.
-  const auto chosen = namingFile(given.input.string(), [&] {
-    options.resolution =
-        resolved(given.resolution, storedGrids(file, wanted), decodingOf(file, given), log);
-    return writable(file, wanted, options, log);
+  EsvrFile coarser;  // with voxels in place of carried grids
+  const auto named = [&](const auto& action) { return namingFile(given.input.string(), action); };
+  const Content all = named([&]() -> Content {
+    if (!coarsensCarried(given, content.file)) return content;
+    coarser = withCarriedAsVoxels(content.file, readingCarried(content.file, given));
+    return {coarser};
   });
+  options.resolution = named([&] {
+    const auto stored = storedGrids(all.file, chooseGrids(given.input, all.file, given.grids));
+    return resolved(given.resolution, stored, decodingOf(all.file, given), log);
+  });
+  // Where the memory allows all voxels, carried grids are written as they are.
+  const Content& used = changesResolution(options) ? all : content;
+  const EsvrFile& file = used.file;
+  const auto chosen = named(
+      [&] { return writable(file, chooseGrids(given.input, file, given.grids), options, log); });
   cli::WatchedInputs watched;
   if (options.reference) watched.add(*options.reference);
   std::vector<ComparedGrid> compared;
@@ -507,7 +530,7 @@ void convertContent(const Options& given, const Content& content, const CancelTo
   if (cancel.cancelled()) throw Cancelled();
   tellLostMetadata(file, grids, options, log);
   tellCarried(file, chosen, options, log);
-  tellUncut(content, chosen, options, log);
+  tellUncut(used, chosen, options, log);
   tellImprecise(file, chosen, log);
   namingFile(given.input.string(), [&] {
     writeGrids(options.output, file.metadata, inOrder(file, chosen, grids), options.write);

@@ -31,10 +31,11 @@ struct Margin {
 };
 
 /// Searches the smallest grid of ellipsoids with a PSNR, or the best one with a size. At most
-/// Plan::wholeFits whole fits are made (up to four if few ellipsoids suffice, or while each is far above the PSNR; for a size
-/// up to five, if the ellipsoids of none before keep to it), and at most six short ones: four to find the number of ellipsoids, one to
-/// decide about their signs, and one that shows that averages do not suffice. One of them is continued for Preset::kHigh (probe()). A frame of a sequence continues the ellipsoids
-/// of the frame before instead of making short fits.
+/// Plan::wholeFits whole fits are made (up to four if few ellipsoids suffice, or while each is far above the PSNR; for a
+/// size up to five, if the ellipsoids of none before keep to it), and at most six short ones: four to find the number of
+/// ellipsoids, one to decide about their signs, and one that shows that averages do not suffice. For Preset::kHigh, one of
+/// them is continued (probe()). A frame of a sequence continues the ellipsoids of the frame before instead of making short
+/// fits.
 class EllipsoidSearch {
  public:
   /// \param before  the ellipsoids to continue, with a PSNR; null: there are none

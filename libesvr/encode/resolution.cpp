@@ -420,6 +420,63 @@ VectorGrid decodeVectorAtResolution(const std::string& name, StoredComponents co
                            });
 }
 
+// ---- Carried grids
+
+namespace {
+
+/// Adds a carried grid as exact voxels.
+/// \return false if it has no numbers with another resolution; nothing was added
+bool addAsVoxels(const CarriedGrid& carried, const ReadOptions& read, EsvrFile& file) try {
+  const GridSummary summary = inspectCarried(carried);
+  const auto add = [&](const GridDescriptor& descriptor, const SparseVolume& volume) {
+    file.grids.push_back(makeStoredVoxels(descriptor, volume, smallestExactLayer(volume)));
+  };
+  if (summary.isVector) {
+    const VectorGrid vectors = readVector(carried, read);
+    if (!vectors.descriptor.transform.affine) return false;
+    file.vectors.push_back({vectors.descriptor.name, file.grids.size()});
+    GridDescriptor component = vectors.descriptor;
+    for (std::size_t c = 0; c < kComponents; ++c) {
+      component.name = componentName(vectors.descriptor.name, c);
+      component.background = vectors.background[c];
+      add(component, vectors.components[c]);
+      component.metadata.clear();  // component x has it
+    }
+    return true;
+  }
+  if (!summary.isScalar || !summary.skipReason.empty()) return false;
+  const VolumeGrid grid = readGrid(carried, read);
+  if (!grid.descriptor.transform.affine) return false;
+  add(grid.descriptor, grid.volume);
+  return true;
+} catch (const CannotConvert&) {
+  return false;
+}
+
+}  // namespace
+
+EsvrFile withCarriedAsVoxels(const EsvrFile& file, const ReadOptions& read) {
+  EsvrFile made{.metadata = file.metadata, .grids = {}, .layout = file.layout};
+  for (const GridOfFile& grid : gridsInOrder(file)) {
+    if (grid.isCarried) {
+      if (addAsVoxels(file.carried[grid.index], read, made)) continue;
+      const std::size_t place = made.grids.size() + made.carried.size();
+      made.carried.push_back(file.carried[grid.index]);
+      made.carried.back().place = std::uint32_t(place);
+      continue;
+    }
+    const std::size_t first = grid.isVector ? file.vectors[grid.index].first : grid.index;
+    if (grid.isVector) made.vectors.push_back({nameOf(file, grid), made.grids.size()});
+    for (std::size_t g = first; g < first + (grid.isVector ? kComponents : 1); ++g) {
+      made.grids.push_back(file.grids[g]);
+      made.grids.back().reference.reset();  // it counts the grids of the other file
+    }
+  }
+  return made;
+}
+
+// ---- Fields and memory
+
 Field amongOtherVoxels(Field field, double factor) {
   for (Chunk& chunk : field.chunks) chunk = finerChunk(chunk, factor);
   return field;

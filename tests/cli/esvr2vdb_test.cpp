@@ -502,14 +502,39 @@ TEST_F(CoarserGrid, isAsLargeAsTheMemoryAllows) {
             2 * readEsvr(out()).grids.front().activeVoxels);
 }
 
-TEST_F(CoarserGrid, leavesCarriedGridsWhereTheMemoryAllowsAllVoxels) {
+TEST_F(CoarserGrid, ofACarriedGridIsThatOfItsVoxels) {
   std::filesystem::remove(in());
   writeInput(in(), {{.voxels = softBall({})}, {.name = "kept", .voxels = softBall({})}});
   succeeded(quickFit(in(), out(), "--force --keep kept"));
   EXPECT_EQ(succeeded(write("--coarsen auto")).err, "");
-  EXPECT_THAT(inspectVdb(back()).grids, testing::SizeIs(2));
-  EXPECT_THAT(succeeded(write("--coarsen 2")).err, HasSubstr("is left out"));
+  EXPECT_EQ(readEsvr(out()).carried.size(), 1u);
+  const VolumeGrid whole = readGrid(in(), "kept");
+  EXPECT_EQ(volumeDifference(readGrid(back(), "kept").volume, whole.volume), "");
+  const SparseVolume expected = coarsened(whole.volume, 2);
+  for (const Words& options :
+       {Words{"--coarsen", "2"},
+        Words{"--voxel-size", std::to_string(2.0 * (*whole.descriptor.transform.affine)[0])}}) {
+    EXPECT_EQ(succeeded(write(options)).err, "");
+    EXPECT_EQ(volumeDifference(readGrid(back(), "kept").volume, expected), "");
+  }
+  succeeded(quickFit(in(), out(), "--force --keep kept"));
+  const std::string finer = std::to_string(0.5 * (*whole.descriptor.transform.affine)[0]);
+  EXPECT_THAT(succeeded(write({"--voxel-size", finer})).err, HasSubstr("is left out"));
   EXPECT_THAT(inspectVdb(back()).grids, testing::SizeIs(1));
+}
+
+TEST_F(CoarserGrid, ofCarriedVectorsIsThatOfTheirComponents) {
+  std::filesystem::remove(in());
+  writeVectorInput(in(), {.voxels = softBall({})});
+  succeeded(vdb2esvr({in(), out(), "--force", "--keep", "velocity"}));
+  ASSERT_EQ(readEsvr(out()).carried.size(), 1u);
+  succeeded(write("--coarsen 2"));
+  const VectorGrid source = readVector(in(), 0), made = readVector(back(), 0);
+  EXPECT_EQ(made.descriptor.transform.affine, transformAt(source.descriptor.transform, 2.0).affine);
+  VectorVolume expected;
+  for (std::size_t c = 0; c < kComponents; ++c) expected[c] = coarsened(source.components[c], 2);
+  const VectorVolume wanted = aligned(expected), got = aligned(made.components);
+  for (std::size_t c = 0; c < kComponents; ++c) EXPECT_EQ(volumeDifference(got[c], wanted[c]), "");
 }
 
 TEST_F(CoarserGrid, ofVectorsIsThatOfTheirComponents) {

@@ -251,20 +251,37 @@ Saved decodeAll(const EsvrFile& file, const SavedPart& part) {
   return saved;
 }
 
+/// Whether carried grids get coarser voxels. With finer ones, voxels have no values between them.
+bool coarsensCarried(const EsvrFile& file, const SavedPart& part) {
+  const bool isCut = part.box || part.layers || part.maxEllipsoids;
+  if (file.carried.empty() || isCut) return false;
+  if (!part.resolution.voxelSize) return part.resolution.coarsen > 1;
+  return !file.grids.empty() && std::ranges::all_of(file.grids, [&](const StoredGrid& grid) {
+    return factorOf(grid.descriptor.transform, part.resolution) >= 1.0;
+  });
+}
+
 /// Writes the voxels of all grids of a file to a .vdb or .nvdb file.
 /// \return the names of the carried grids that were left out because they cannot be cut
 /// \throws UsageError  the box is empty, or a number is 0
 /// \throws BadInput  all grids would be left out
 std::vector<std::string> saveFile(const File& self, const std::filesystem::path& path,
                                   const SavedPart& part, bool overwrite) {
-  const EsvrFile& file = *self.file;
+  EsvrFile coarser;  // with voxels in place of carried grids, once it is needed
+  const EsvrFile* file = nullptr;
   const Saved saved = atResolution(part.resolution, [&](const SavedResolution& resolution) {
     SavedPart chosen = part;
     chosen.resolution = resolution;
-    if (part.resolution.isAuto) requireTogether(file, chosen);
-    return decodeAll(file, chosen);  // carried grids are left out only where voxels change
+    file = self.file.get();
+    if (coarsensCarried(*file, chosen)) {
+      if (coarser.grids.empty())
+        coarser = withCarriedAsVoxels(*file, {.maxBytes = usualMemoryLimit()});
+      file = &coarser;
+    }
+    if (part.resolution.isAuto) requireTogether(*file, chosen);
+    return decodeAll(*file, chosen);
   });
-  writeGrids(path, file.metadata, inOrder(file, saved.chosen.grids, saved.decoded),
+  writeGrids(path, file->metadata, inOrder(*file, saved.chosen.grids, saved.decoded),
              {.overwrite = overwrite});
   return saved.chosen.leftOut;
 }
@@ -303,8 +320,9 @@ void addFiles(py::module_& module) {
           "Writes the voxels of all grids to a .vdb or .nvdb file, as esvr2vdb does.\n\n"
           "box ((x0, y0, z0), (x1, y1, z1)), layers and max_ellipsoids are --bbox, --lod and\n"
           "--max-ellipsoids of esvr2vdb; coarsen and voxel_size are those of Grid.to_volume. With\n"
-          "one of them, carried grids are left out, because they cannot be cut. Returns the names "
-          "of the grids that were left out.")
+          "one of them, carried grids are left out if they cannot be cut or have no coarser "
+          "voxels. "
+          "Returns\nthe names of the grids that were left out.")
       .def(
           "__len__", [](const File& f) { return f.file->grids.size(); }, "The number of grids.")
       .def("__repr__", [](const File& f) { return describe(f); });

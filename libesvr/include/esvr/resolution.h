@@ -13,6 +13,7 @@
 #include "esvr/container.h"
 #include "esvr/grid.h"
 #include "esvr/grid_coding.h"
+#include "esvr/vdb_io.h"
 #include "esvr/volume.h"
 
 namespace esvr {
@@ -58,6 +59,13 @@ inline constexpr double kFinestFactor = 1.0 / 64.0, kCoarsestFactor = 1024.0;
 
 /// The ellipsoids of a field among voxels whose edges are `factor` times as long. Below 1, there are more voxels.
 [[nodiscard]] Field amongOtherVoxels(Field field, double factor);
+
+/// The file with exact voxels in place of the carried grids of numbers and vectors, which have other resolutions, too. Carried
+/// grids of other types, without an active voxel, with voxels that are not finite or with a map that is not affine stay
+/// carried.
+/// \param read  limits of the memory
+/// \throws BadInput, MemoryExceeded  as for readGrid (vdb_io.h)
+[[nodiscard]] EsvrFile withCarriedAsVoxels(const EsvrFile& file, const ReadOptions& read = {});
 
 /// Bytes of memory that decodeAtResolution() takes at most, but for level sets.
 struct ResolutionBytes {
