@@ -114,7 +114,7 @@ def test_carried_grids_have_coarser_voxels(tmp_path, run):
     assert [name for name, _ in esvr.list_grids(tmp_path / "coarse.vdb")] == ["density", "temperature"]
     fine, coarse = (esvr.Volume.from_vdb(tmp_path / name, "density") for name in ("two.vdb", "coarse.vdb"))
     assert coarse.transform[0, 0] == 2 * fine.transform[0, 0]
-    assert coarse.to_numpy().sum() == pytest.approx(fine.to_numpy().sum() / 8, rel=1e-6)
+    assert coarse.to_numpy().sum() == pytest.approx(fine.to_numpy().sum() / 8, rel=1e-3)  # halfs
 
 
 def test_a_file_without_a_grid_that_can_be_cut_is_refused(tmp_path, run):
