@@ -342,9 +342,19 @@ std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<Liste
                                    const Options& options, const cli::Log& log) {
   std::vector<DecodedGrid> grids;
   DecodeOptions decode = decodingOf(file, options);
+  const std::uint64_t most = decode.maxBytes;
+  const VoxelMemory inFiles = decode.memory.forAllSizes();
   for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
-    grids.push_back(decoded(file, named, options, decode));
+    // Grids that are small each may be too many together. Those on the heap get a quarter.
+    if (decode.maxBytes < most - most / 4) decode.memory = inFiles;
+    try {
+      grids.push_back(decoded(file, named, options, decode));
+    } catch (const MemoryExceeded&) {
+      if (decode.memory == inFiles) throw;
+      decode.memory = inFiles;
+      grids.push_back(decoded(file, named, options, decode));
+    }
     if (activeVoxelsOf(grids.back()) == 0)
       log.warning("grid \"" + named.name + "\" comes back without an active voxel");
     // All grids are in memory, and twice while they are written.

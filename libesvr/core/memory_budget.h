@@ -31,19 +31,19 @@ class MemoryBudget {
   }
 
   /// Takes bytes for an array of voxels and what belongs to it. The array is in a file if it is large,
-  /// and also if all arrays on the heap would take more than half of the budget: many grids that are
-  /// small each may be too large together.
+  /// and also if all arrays on the heap would take more than a quarter of the budget: many grids that
+  /// are small each may be too large together.
   /// \param onHeap  bytes that a file saves
   /// \param besides  bytes that are needed in any case
   /// \return where the array is
   /// \throws MemoryExceeded  as for take()
   [[nodiscard]] VoxelMemory takeVoxels(std::uint64_t arrayBytes, double onHeap, double besides,
                                        const std::string& what) {
-    const bool areTooMany = onHeap_ + onHeap > 0.5 * double(max_);
+    const bool areTooMany = arraysOnHeap_ + double(arrayBytes) > 0.25 * double(max_);
     VoxelMemory memory = areTooMany ? voxels_.forAllSizes() : voxels_;
-    const double taken = memory.isInFile(arrayBytes) ? 0.0 : onHeap;
-    onHeap_ += taken;
-    take(besides + taken, what);
+    const bool isOnHeap = !memory.isInFile(arrayBytes);
+    if (isOnHeap) arraysOnHeap_ += double(arrayBytes);
+    take(besides + (isOnHeap ? onHeap : 0.0), what);
     return memory;
   }
 
@@ -51,7 +51,7 @@ class MemoryBudget {
   std::uint64_t max_;
   VoxelMemory voxels_;
   double taken_ = 0.0;
-  double onHeap_ = 0.0;  ///< the part of it for voxels
+  double arraysOnHeap_ = 0.0;  ///< bytes
 };
 
 }  // namespace esvr

@@ -116,7 +116,7 @@ class Choice {
     if (isBetter || (conversion_ && isCancelled(job_)))
       return ellipsoidsInsteadOf(expected ? expected : tooLarge);
     auto voxels = finishedVoxels();
-    if (!voxels && !conversion_) throw tooSmall(ellipsoids_->needed());
+    if (!voxels && !conversion_) refuseSize(ellipsoids_->needed());
     if (!voxels || (conversion_ && *figures_->psnr > voxels->psnr))
       return ellipsoidsInsteadOf(voxels ? figuresOf(*voxels) : expected);
     return asConversion(std::move(*voxels), figures_, FitEnd::kScheduleDone);
@@ -150,8 +150,10 @@ class Choice {
   /// nothing but bytes, and a fit takes up to ten times as long.
   bool leavesOutFits(std::uint64_t voxelBytes) {
     constexpr double kBitsForSize = 2.0, kBitsForQuality = 1.25;
-    const double bits = (goal_.bytes ? kBitsForSize : kBitsForQuality) *
-                        double(activeVoxelCount(job_.input.source));
+    const auto* preset = std::get_if<PresetGoal>(&job_.options.goal);
+    const bool isForSize = goal_.bytes || (preset && preset->abovePreset != 0.0);
+    const double bits =
+        (isForSize ? kBitsForSize : kBitsForQuality) * double(activeVoxelCount(job_.input.source));
     const bool isDetailed = job_.options.effort == kLeastEffort && 8.0 * double(voxelBytes) > bits;
     fitsTookTooLong_ = !plan_.fitsInTime || isDetailed;
     return fitsTookTooLong_;
@@ -159,24 +161,26 @@ class Choice {
 
   bool isOnGpu() const { return job_.options.fit.device.kind == DeviceKind::kCuda; }
 
-  UsageError tooSmall(std::uint64_t needed) const {
+  /// \throws Cancelled  nothing was found because the search was cancelled
+  [[noreturn]] void refuseSize(std::uint64_t needed) const {
+    if (isCancelled(job_)) throw Cancelled();
     const std::string grid = "grid '" + shownName(job_.input.descriptor.name) + "'";
     if (job_.options.fit.narrowBand && wanted_ != Representation::kVoxels)
-      return UsageError(grid +
-                        ": ellipsoids and the residual that corrects the signs of the level set do "
-                        "not fit into " +
-                        std::to_string(*goal_.bytes) + " bytes" +
-                        (wanted_ == Representation::kAuto ? ", and voxels neither" : ""));
+      throw UsageError(grid +
+                       ": ellipsoids and the residual that corrects the signs of the level set do "
+                       "not fit into " +
+                       std::to_string(*goal_.bytes) + " bytes" +
+                       (wanted_ == Representation::kAuto ? ", and voxels neither" : ""));
     const std::string takes = needed > 0 ? "takes at least " + std::to_string(needed) + " bytes"
                                          : "has no voxels of that size";
-    return UsageError(grid + " " + takes + "; the size allows " + std::to_string(*goal_.bytes));
+    throw UsageError(grid + " " + takes + "; the size allows " + std::to_string(*goal_.bytes));
   }
 
   Conversion ellipsoidsAlone() {
     ellipsoids_.emplace(job_, goal_);
     ellipsoids_->draft();
     auto made = ellipsoids_->run();
-    if (!made) throw tooSmall(ellipsoids_->needed());
+    if (!made) refuseSize(ellipsoids_->needed());
     return std::move(*made);
   }
 
@@ -241,7 +245,7 @@ class Choice {
 
   Conversion completeVoxels() {
     auto voxels = voxels_->run();
-    if (!voxels) throw tooSmall(0);
+    if (!voxels) refuseSize(0);
     Conversion conversion = asConversion(std::move(*voxels), figures_,
                                          goal_.psnr ? FitEnd::kPsnrReached : FitEnd::kScheduleDone);
     if (isCancelled(job_)) conversion.fit.end = FitEnd::kCancelled;

@@ -636,6 +636,11 @@ std::optional<Conversion> EllipsoidSearch::runToPsnr() {
 /// The smallest conversion of the attempts that reach the PSNR; otherwise the best one, as missed.
 Conversion EllipsoidSearch::smallestOrBest() {
   const auto worse = [](const Attempt& a, const Attempt& b) { return a.psnr < b.psnr; };
+  // A cancelled fit that has just begun is worse than the short one before it.
+  if (std::ranges::any_of(attempts_, &Attempt::cancelled)) {
+    attempts_.push_back(*draft_);
+    attempts_.back().fit.end = FitEnd::kCancelled;
+  }
   std::ranges::sort(attempts_, worse);
   const auto reached =
       std::ranges::find_if(attempts_, [&](const Attempt& a) { return a.psnr > *goal_.psnr; });

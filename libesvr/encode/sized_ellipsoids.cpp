@@ -91,6 +91,10 @@ std::optional<Conversion> EllipsoidSearch::runToSize() {
       draft_->fit.end = FitEnd::kCancelled;
       break;
     }
+    if (attempt->cancelled() && attempt->psnr < draft_->psnr) {  // it has just begun
+      draft_->fit.end = FitEnd::kCancelled;
+      break;
+    }
     auto now = filled(*attempt);
     if (!now) break;
     const bool isSmall = needed_ <= *goal_.bytes, isGood = now->loss <= rounding_.mostLoss;
