@@ -141,7 +141,7 @@ void addHostMemory(CommandLine& line) {
       kMaxMemory, po::value<std::string>()->value_name("SIZE"),
       "memory that may be taken, for example 8GB (default: 3/4 of the memory that is available); "
       "voxels that need more than a quarter of it, alone or together, are kept in files; a run "
-      "that needs more is refused with exit code 5, as far as this can be estimated before the work "
+      "that needs more is refused with exit code 5, as far as this can be told before the work "
       "begins")(kScratch, po::value<std::string>()->value_name("DIR"),
                 "folder for the file that holds voxels which do not fit into memory (default: "
                 "$TMPDIR, or /var/tmp)");
