@@ -138,6 +138,38 @@ TEST(Cancellation, SlowAtAnyLookLeavesAGridThatKeepsItsPromisesOrNone) {
   EXPECT_GT(results, 20u);  // most of what is cancelled late has a result
 }
 
+/// A whole fit that has just begun is worse than the short one before it, which is then the result.
+TEST(Cancellation, LaterLeavesNoMuchWorseGrid) {
+  const SparseVolume volume = test::smoothVolume();
+  for (const Goal& goal : {Goal{SizeGoal{1500}}, Goal{PsnrGoal{45.0}}}) {
+    ConvertOptions options;
+    options.goal = goal;
+    options.representation = Representation::kEllipsoids;
+    const auto cancelledBy = [&](const CancelToken& token) -> std::optional<double> {
+      options.fit.cancel = &token;
+      try {
+        const Conversion made = convertVolume({{}, volume}, options);
+        return compareVolumes(volume, decodeGrid(made.grid)).psnrBox;
+      } catch (const Cancelled&) {
+        return std::nullopt;
+      }
+    };
+    const CountingToken counting;
+    ASSERT_TRUE(cancelledBy(counting));
+    constexpr int kTrials = 24;
+    constexpr double kByRounding = 6.0;  // dB that are lost where the rounding is cancelled
+    double best = 0.0;
+    for (int n = 1; n <= kTrials; ++n) {
+      const CountingToken token(counting.looks() * std::uint64_t(n) / kTrials);
+      const auto psnr = cancelledBy(token);
+      if (!psnr) continue;
+      EXPECT_GT(*psnr, best - kByRounding) << n << " of " << kTrials;
+      best = std::max(best, *psnr);
+    }
+    EXPECT_GT(best, 30.0);
+  }
+}
+
 /// 5.5 million active voxels with waves of several lengths and some noise.
 SparseVolume largeVolume() {
   return test::volumeOf({}, 22, 0.0f, [](Coord v) {
