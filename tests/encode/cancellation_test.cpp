@@ -156,7 +156,7 @@ TEST(Cancellation, LaterLeavesNoMuchWorseGrid) {
     };
     const CountingToken counting;
     ASSERT_TRUE(cancelledBy(counting));
-    constexpr int kTrials = 24;
+    constexpr int kTrials = 12;
     constexpr double kByRounding = 6.0;  // dB that are lost where the rounding is cancelled
     double best = 0.0;
     for (int n = 1; n <= kTrials; ++n) {
