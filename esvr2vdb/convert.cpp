@@ -346,8 +346,8 @@ std::vector<DecodedGrid> decodeAll(const EsvrFile& file, const std::vector<Liste
   const VoxelMemory inFiles = decode.memory.forAllSizes();
   for (const ListedGrid& named : chosen) {
     if (named.grid.isCarried) continue;
-    // Grids that are small each may be too many together. Those on the heap get a quarter.
-    if (decode.maxBytes < most - most / 4) decode.memory = inFiles;
+    // Grids that are small each may be too large together.
+    if (decode.memory.isInFile(most - decode.maxBytes)) decode.memory = inFiles;
     try {
       grids.push_back(decoded(file, named, options, decode));
     } catch (const MemoryExceeded&) {

@@ -31,18 +31,18 @@ class MemoryBudget {
   }
 
   /// Takes bytes for an array of voxels and what belongs to it. The array is in a file if it is large,
-  /// and also if all arrays on the heap would take more than a quarter of the budget: many grids that
-  /// are small each may be too large together.
+  /// and also if all arrays on the heap together would be: many grids that are small each may be too
+  /// large together.
   /// \param onHeap  bytes that a file saves
   /// \param besides  bytes that are needed in any case
   /// \return where the array is
   /// \throws MemoryExceeded  as for take()
   [[nodiscard]] VoxelMemory takeVoxels(std::uint64_t arrayBytes, double onHeap, double besides,
                                        const std::string& what) {
-    const bool areTooMany = arraysOnHeap_ + double(arrayBytes) > 0.25 * double(max_);
+    const bool areTooMany = voxels_.isInFile(arraysOnHeap_ + arrayBytes);
     VoxelMemory memory = areTooMany ? voxels_.forAllSizes() : voxels_;
     const bool isOnHeap = !memory.isInFile(arrayBytes);
-    if (isOnHeap) arraysOnHeap_ += double(arrayBytes);
+    if (isOnHeap) arraysOnHeap_ += arrayBytes;
     take(besides + (isOnHeap ? onHeap : 0.0), what);
     return memory;
   }
@@ -51,7 +51,7 @@ class MemoryBudget {
   std::uint64_t max_;
   VoxelMemory voxels_;
   double taken_ = 0.0;
-  double arraysOnHeap_ = 0.0;  ///< bytes
+  std::uint64_t arraysOnHeap_ = 0;  ///< bytes of the arrays that takeVoxels() left on the heap
 };
 
 }  // namespace esvr
