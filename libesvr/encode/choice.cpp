@@ -20,9 +20,9 @@ namespace esvr::encode {
 
 namespace {
 
-/// Bytes that a fit on the CPU must be expected to save, compared with voxels, for each brick and iteration. These take 5 to
-/// 15 us, so that a fit saves at least some 200 bytes in each second. A fit saves 0.082 in smoke1, 0.009 in hydrogen_atom, 0.013
-/// in dragon, and 0.0008 in the shadow of gas_0006, where the fits took 30 s for 1.5 KB.
+/// Bytes that a fit on the CPU must be expected to save, compared with voxels, for each brick and iteration. An
+/// iteration takes 5 to 15 us for each brick, so that a fit saves at least some 200 bytes in each second. Fits save 0.082 such
+/// bytes in smoke1, 0.009 in hydrogen_atom, 0.013 in dragon, and 0.0008 in the shadow of gas_0006, where 1.5 KB took 30 s.
 constexpr double kBytesPerWork = 0.002;
 
 Candidate figuresOf(const VoxelCandidate& voxels) {
@@ -147,7 +147,8 @@ class Choice {
   /// Whether no fit is made beside voxels of so many bytes, because it would take too long for the effort. The least effort
   /// makes none where voxels need many bits, because ellipsoids do, too: for the sizes of external_points.md, they were
   /// better up to 2.0 bits for each active voxel, and worse from 3.6 on. For a quality, voxels of more than 1.25 bits cost
-  /// nothing but bytes, and a fit takes up to ten times as long.
+  /// nothing but bytes, and a fit takes up to ten times as long. Qualities above or below a preset belong to the search for
+  /// the size of several grids.
   bool leavesOutFits(std::uint64_t voxelBytes) {
     constexpr double kBitsForSize = 2.0, kBitsForQuality = 1.25;
     const auto* preset = std::get_if<PresetGoal>(&job_.options.goal);
@@ -196,8 +197,8 @@ class Choice {
     const bool onGpu = isOnGpu() && activeVoxelCount(job_.input.source) >= kMinDraftedVoxels;
     std::optional<Candidate> expected;
     const auto areSmallEnough = [&](const Candidate& voxels) {
-      return leavesOutFits(voxels.bytes) ||
-             (voxels.bytes < smallEnough && !voxels_->areFarBehind());
+      return (voxels.bytes < smallEnough && !voxels_->areFarBehind()) ||
+             leavesOutFits(voxels.bytes);
     };
     const auto draft = [&](const CancelToken* cancel) {
       seconds_ += secondsOf([&] {

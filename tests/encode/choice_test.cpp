@@ -139,6 +139,10 @@ TEST(ChoiceAtTheLeastEffort, FitsWhatIsSmoothAlone) {
     EXPECT_TRUE(conversion.fitsTookTooLong);
     EXPECT_FALSE(conversion.choice && conversion.choice->ellipsoids);
   }
+  options.goal = PresetGoal{};
+  const Conversion small = convertVolume({{}, test::noiseVolume(1)}, options);
+  EXPECT_TRUE(small.grid.voxels);
+  EXPECT_FALSE(small.fitsTookTooLong) << "voxels are so small that no effort fits them";
   options.representation = Representation::kVoxels;
   EXPECT_FALSE(convertVolume({{}, smooth}, options).fitsTookTooLong) << "none was asked for";
 }
