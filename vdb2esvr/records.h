@@ -30,7 +30,8 @@ struct ConvertedVector {
 };
 
 struct RunRecord {
-  VdbSummary input;  ///< of splats: the grids that became of them, and the size of their own file
+  /// The input. For splats, it lists the grids that became of them, and has the size of their own file.
+  VdbSummary input;
   bool isOfSplats = false;             ///< grids have no bytes of their own in the input
   std::vector<NotFitted> carried;      ///< grids that the file holds unchanged
   std::vector<NotFitted> skipped;      ///< grids that the user left out

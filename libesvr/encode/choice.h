@@ -9,8 +9,8 @@ namespace esvr::encode {
 
 /// When ellipsoids are worth their fits.
 struct Worthwhile {
-  double share =
-      1.0;  ///< share of the voxels' bytes that ellipsoids must be expected to stay below
+  /// The share of the voxels' bytes that ellipsoids must be expected to stay below.
+  double share = 1.0;
   /// Bytes of voxels below which no ellipsoids are tried, unless they are far smaller.
   std::uint64_t smallEnough = 0;
 };

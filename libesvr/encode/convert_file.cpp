@@ -391,12 +391,12 @@ class SizeSearch {
   const FileOptions& options_;
   GridConverter& converter_;
   const Twins& twins_;
-  std::optional<ConvertedFile> best_;      ///< of those that keep to the size
-  std::optional<ConvertedFile> smallest_;  ///< as long as none does
+  std::optional<ConvertedFile> best_;      ///< the best file that keeps to the size
+  std::optional<ConvertedFile> smallest_;  ///< the smallest file, as long as none keeps to the size
   std::optional<std::uint64_t> fewest_;
   std::vector<double> seconds_;  ///< time that all conversions of each grid took
-  std::vector<double>
-      betterAsVoxels_;  ///< PresetGoal::abovePreset from which on each grid is better as voxels
+  /// PresetGoal::abovePreset from which on each grid is better as voxels.
+  std::vector<double> betterAsVoxels_;
 };
 
 /// Converts the grids to a file of at most a size.

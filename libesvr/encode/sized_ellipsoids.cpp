@@ -15,10 +15,10 @@ namespace {
 /// up.
 constexpr double kMoreEach = 1.25;
 constexpr int kFitsUntilOneIsSmall = 5;
-/// Limits for the residual of the signs of a narrow band (docs/lab-notes.md, "Signs of a size"): the largest share of a size with which
-/// ellipsoids are of use, the growth for which a fit that follows one without enough room for it allows, the share of a size that
-/// is used well, how often the bytes are divided, and the loss by rounding, dB, below which a first fit was left so much room that
-/// another one has more ellipsoids.
+/// Limits for the residual of the signs of a narrow band (docs/lab-notes.md, "Signs of a size"): the largest share of a
+/// size with which ellipsoids are of use, the growth for which a fit that follows one without enough room for it allows,
+/// the share of a size that is used well, the loss by rounding, dB, below which a first fit was left so much room that
+/// another one has more ellipsoids, and how often the bytes are divided.
 constexpr double kMostOfSigns = 0.5, kMoreSigns = 0.2, kLeastShareWithSigns = 0.97,
                  kSpareLoss = 0.35;
 constexpr int kMostDivisions = 3;

@@ -64,7 +64,7 @@ struct ToVoxels {
   Matrix3 linear{};  ///< a map of columns
   std::array<double, 3> shift{};
   double perUnit;      ///< units of the world for a unit of the file
-  double voxelVolume;  ///< in the world
+  double voxelVolume;  ///< volume of a voxel in the world
 
   ToVoxels(const Affine& m, const VoxelLattice& lattice)
       : perUnit(std::sqrt(m[0] * m[0] + m[1] * m[1] + m[2] * m[2])) {

@@ -257,7 +257,8 @@ TEST(ConvertGridsToSize, LeavesItsSmallestFileWhereItIsCancelledBeforeOneKeepsTo
   constexpr std::uint64_t kSize = 500;
   const FileSource file =
       fileOf({{"a", softBall({}, 1.0f, 16.0)}, {"b", softBall({3, 0, 0}, 1.0f)}});
-  for (const int stepsUntil : {1, 2, 3}) {  // in the first trial, at its end, and in the second one
+  // The run is interrupted in the first trial, at its end, and in the second one.
+  for (const int stepsUntil : {1, 2, 3}) {
     CancelToken token;
     FileOptions options = fileOptions(PresetGoal{});
     options.size = kSize;

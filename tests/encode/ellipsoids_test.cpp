@@ -83,7 +83,7 @@ TEST(EllipsoidSearch, SlowProbesBeforeTheLongFitsOfTheHighPreset) {
   for (const Preset preset : {Preset::kStandard, Preset::kHigh}) {
     ConvertOptions options = ofIterations(800);
     options.fit.preset = preset;
-    std::vector<std::uint32_t> lengths;  // of the whole fits, and of the probe before them
+    std::vector<std::uint32_t> lengths;  // iterations of the probe and of the whole fits
     double last = 1.0;
     options.fit.progress = [&](const FitProgress& progress) {
       if (progress.fraction < last) lengths.push_back(0);
